@@ -14,8 +14,7 @@ from processors.errors import ConfigurationError
 
 
 def claim(settings: KafkaSettings, group: str, names: Sequence[str], member: str, stop: Event) -> Transactions:
-    """Begin to claim the name of the runner that is `member` of those of these processors. Raises ConfigurationError where it can
-    be no name."""
+    """Begin to claim the name of the runner `member` of these processors. Raises ConfigurationError for a member with a dot."""
     if "." in member:  # it stands behind the last dot of the transactional id
         raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
     return Transactions(settings, Topics(group).writer(names, member), stop.is_set)

@@ -22,12 +22,12 @@ _NOBODY = (ConsumerGroupState.EMPTY, ConsumerGroupState.DEAD)
 def refuse_overlap(settings: KafkaSettings, topics: Topics, names: Sequence[str], stop: Event) -> None:
     """Raise ConfigurationError where a processor of this set runs in another one: both would publish, and save states of one
     name at different places of the log. Members of a set that ended in order are in it for `session_s` more."""
-    until_s = time.monotonic() + SESSIONS * settings.session_s
-    while found := _overlapping(_groups(settings, topics.runners(()), are_live=True), topics, names):
+    admin, until_s = AdminClient(settings.client()), time.monotonic() + SESSIONS * settings.session_s
+    while found := _overlapping(_groups(admin, topics.runners(()), are_live=True), topics, names):
         group, both = found
         if time.monotonic() > until_s:
             raise ConfigurationError(
-                f"kafka: {' and '.join(both)} run in the consumer group {group} as well; end its runners first"
+                f"kafka: runners of {' and '.join(both)} run in the consumer group {group} as well; end them first"
             )
         if stop.wait(AGAIN_S):
             return
@@ -49,7 +49,7 @@ def published_up_to(settings: KafkaSettings, topics: Topics) -> dict[int, int]:
     """
     admin = AdminClient(settings.client())
     furthest: dict[int, int] = {}
-    for group in _groups(settings, topics.bridge(""), are_live=False):
+    for group in _groups(admin, topics.bridge(""), are_live=False):
         asked = admin.list_consumer_group_offsets([ConsumerGroupTopicPartitions(group)], request_timeout=ANSWER_S)
         for place in asked[group].result(ANSWER_S).topic_partitions or ():
             if place.topic == topics.results and place.offset >= 0:
@@ -57,9 +57,8 @@ def published_up_to(settings: KafkaSettings, topics: Topics) -> dict[int, int]:
     return furthest
 
 
-def _groups(settings: KafkaSettings, prefix: str, *, are_live: bool) -> list[str]:
-    """Return the groups whose names begin so, those with members only where `are_live`; none where the cluster does not say."""
-    admin = AdminClient(settings.client())
+def _groups(admin: AdminClient, prefix: str, *, are_live: bool) -> list[str]:
+    """Return the groups whose names begin with `prefix`; if `are_live`, only those with members. Empty if the cluster fails."""
     try:
         listed = answered(lambda: admin.list_consumer_groups(request_timeout=ANSWER_S).result(ANSWER_S), ANSWER_S).valid
     except KafkaException as error:

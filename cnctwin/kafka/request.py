@@ -1,5 +1,7 @@
-"""A request in a thread of its own, which may be left behind: where the broker ends in the middle of one, librdkafka may never
-return."""
+"""A request to the cluster in a thread of its own, so that the caller can give it up.
+
+When a broker dies in the middle of a request, librdkafka may never return.
+"""
 
 import logging
 import threading
@@ -14,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 class HungError(ProcessorError):
-    """The cluster has not answered at all."""
+    """The cluster has not answered within the time limit."""
 
 
 class Request(Generic[T]):
@@ -35,7 +37,7 @@ class Request(Generic[T]):
 
     @property
     def is_over(self) -> bool:
-        """True once `answer` returns at once."""
+        """True once the answer or an error is there."""
         return not self._thread.is_alive()
 
     def answer(self, timeout_s: float | None = None) -> T:

@@ -70,7 +70,7 @@ class KafkaSettings(BaseModel):
 
     @property
     def message_bytes_max(self) -> int:
-        """How large a message may be on our side; of the rest the topic decides."""
+        """The size, in bytes, of the largest message that a client of ours sends; a topic may accept less."""
         return min(round(self.buffer_mb * 1024 * 1024) // BUFFER_SHARE, MESSAGE_BYTES_MAX)
 
     def _password(self, environment: Mapping[str, str]) -> str:

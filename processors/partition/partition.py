@@ -175,8 +175,11 @@ class Partition:
         return told
 
     def _watermark(self, offset: int, record: Record) -> Sequence[Result]:
-        writers, writer = self._writers, record.writer
-        is_meant = lambda machine: writers.get(machine, writer) == writer  # noqa: E731
+        writer = record.writer
+
+        def is_meant(machine: str) -> bool:
+            return self._writers.get(machine, writer) == writer
+
         told: list[Result] = []
         for seat in self.seats:
             if offset >= seat.from_offset:

@@ -200,7 +200,7 @@ class Engine:
         return actions
 
     def silence(self, wall_s: float, is_meant: Callable[[str], bool] = lambda _: True) -> list[Action]:
-        """No event of the machines that are meant waits: give their ticks up to the present, less the margin."""
+        """Give the machines that are meant, of which no event waits, their ticks up to the present, less the margin."""
         actions: list[Action] = []
         for machine in self.silences.due(wall_s):
             clock_ms = machine.live.clock_ms

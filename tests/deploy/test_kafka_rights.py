@@ -24,7 +24,7 @@ from tests.deploy.kafka_rights import FOLDER, Right, asked_by, rights
 
 HOUR_MS = 3_600_000
 COMPACTED = {f"{key}={value}" for key, value in module.COMPACTED.items()}
-"""As the programs make them."""
+"""The configuration with which the programs create compacted topics."""
 
 
 def may(given: set[Right], user: str, operation: str, kind: str, name: str) -> bool:

@@ -121,7 +121,7 @@ def test_who_restores_may_see_who_has_left_a_transaction_open(kafka: KafkaServer
 
 
 def test_who_may_not_read_a_topic_is_told_so_at_once(kafka: KafkaServer) -> None:
-    """`deadletters`: a runner writes them, so it may ask for their end, and does not read them."""
+    """A runner writes dead letters, so it may ask for the end of their topic, but it may not read them."""
     name = f"{RUNNERS}.gone"
     producer = Producer(kafka.client(AS[RUNNER]) | {"transactional.id": name})
     producer.init_transactions(WAIT_S_MAX)

@@ -128,7 +128,7 @@ def test_garbage_among_the_states_is_left_alone_or_named(kafka: KafkaServer) -> 
 
 
 def test_a_log_that_is_shorter_than_the_states_is_named(kafka: KafkaServer) -> None:
-    """It was made again, or lost its end: what is written up to where it was would count as folded."""
+    """A topic that was created again, or lost its end, would have new records counted as folded already."""
     with Plant(kafka, "shorter", alone(delicate()), machines=4) as plant:
         plant.play(2)
         key = f"~marker/{plant.topics.readings}/{plant.reader}"

@@ -73,7 +73,7 @@ def closed(secured_kafka: KafkaServer, tmp_path: Path) -> Iterator[Closed]:
 
 
 def test_the_rights_of_the_script_are_enough(closed: Closed, mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """Also for those who begin on a log on which others have left results and states."""
+    """The rights also suffice for a bridge and a runner that start on a log with results and states in it."""
     address, shown = BrokerAddress(*mosquitto.address), dict[str, bytes]()
     edge, look = EdgeNode(address, NodeId(GROUP, "edge-mill")), HostApplication(address, "look", [], publish_state=False)
     options = ("--broker", address.url, "--processors", "mirror", "--name", "bridge-0", "--state-dir", str(tmp_path / "state"))

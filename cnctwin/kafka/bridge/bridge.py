@@ -145,8 +145,8 @@ class Bridge:
             self._look(now_s)
 
     def _publishes(self) -> bool:
-        """Return True where results can be published. The edge nodes are born once it is known what was published before; what
-        machines say goes to the log meanwhile."""
+        """Return True if results can be published. The edge nodes are born once the bridge knows what was published before; until
+        then it only writes what machines send to the log."""
         if self._learning is not None:
             if not self._learning.is_over:
                 return False

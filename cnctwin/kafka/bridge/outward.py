@@ -159,8 +159,8 @@ class Outward:
         return untold
 
     def poll(self) -> None:
-        """Have delivery reports come in. Raises BridgeError where nothing goes out any more: what the broker keeps is not
-        acknowledged, and comes again."""
+        """Have delivery reports come in. Raises BridgeError if nothing can go out any more; the broker then delivers the messages
+        that were not acknowledged to the next bridge."""
         self._producer.poll(0)
         if self._fatal:
             raise BridgeError(f"kafka: {self._name} cannot go on: {self._fatal}")
@@ -209,7 +209,7 @@ class Outward:
         return safe
 
     def _on_error(self, error: KafkaError) -> None:
-        """A producer that is beyond help takes nothing more."""
+        """Note an error that the producer cannot recover from; it takes no more records after one."""
         if error.fatal():
             self._fatal = error.str()
         else:

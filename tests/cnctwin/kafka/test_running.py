@@ -15,7 +15,7 @@ from cnctwin.kafka.transaction import FencedError
 from processors.discovery import discover
 
 CLAIMED: Any = SimpleNamespace(name="cnctwin.cnc.thermal.r0")
-"""Stands for a name that was claimed."""
+"""A stand-in for a claimed name."""
 
 
 class Runners:

@@ -106,7 +106,7 @@ def test_killed_anywhere_it_tells_the_same_and_comes_to_the_same(
 
 
 def test_of_several_bridges_the_one_that_hears_a_machine_tells_its_silence() -> None:
-    """Where that bridge is gone nobody knows, and what it brings later is not late."""
+    """While that bridge is down the machine's clock stands still, so data that the bridge delivers later is not late."""
     start = birth(0.0, spindle_rpm=0.0, ambient_temp_c=21.5, spindle_temp_c=24.0)
     told = [data(1.0 + i, spindle_rpm=4000.0) for i in range(3)]
     writer_of = lambda place: "other" if 4 <= place < 60 else "own"  # noqa: E731

@@ -21,7 +21,7 @@ WAIT_S_MAX = 30.0
 
 
 class Host:
-    """A host application to which a machine says something at each poll."""
+    """A host application that hears one message of a machine at each poll."""
 
     online, queue_depth, on_life = True, 1, None
 
@@ -55,7 +55,7 @@ class Node:
 
 
 class Results:
-    """What was published before: learnt once `known` is set, or not at all."""
+    """Results published earlier: `begin` learns them once `known` is set, or fails with `error`."""
 
     def __init__(self) -> None:
         self.known, self.error = Event(), ""
@@ -78,7 +78,7 @@ class Results:
 
 
 class Log:
-    """What went to the log."""
+    """A log that keeps the events it is given."""
 
     def __init__(self) -> None:
         self.events: list[Any] = []
@@ -137,7 +137,7 @@ def test_a_bridge_that_is_to_stop_does_not_wait_for_what_it_learns(it: Any) -> N
 
 
 def test_of_several_bridges_one_hands_on_what_a_processor_of_cells_listens_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each would write every command to all partitions."""
+    """Otherwise every bridge would write each command to all partitions."""
     for name in ("Back", "Outward", "Reports"):
         monkeypatch.setattr(module, name, lambda *_, **__: Results())
     processor, host = discover()["alerts"], Host()

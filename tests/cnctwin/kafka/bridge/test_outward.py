@@ -100,7 +100,7 @@ def test_what_is_too_large_for_the_cluster_is_lost_once_and_ends_nothing(out: ou
 
 
 def test_a_producer_that_is_beyond_help_ends_the_bridge(out: outward.Outward, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the broker keeps is not acknowledged, and comes again to the next one."""
+    """The broker keeps the messages that were not acknowledged, and delivers them to the next bridge."""
 
     def refuse(*_: Any, **__: Any) -> None:
         raise KafkaException(KafkaError(KafkaError._FATAL))
