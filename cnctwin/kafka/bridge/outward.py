@@ -98,8 +98,10 @@ class Outward:
 
     @property
     def delivered(self) -> int:
-        """The number of records that the cluster has acknowledged."""
-        return self._sent - self._given_up - self.waiting
+        """The number of records that the cluster has acknowledged. It never falls: the client's errors that nobody has taken yet
+        count as waiting, too, so that `waiting` may say more than there are."""
+        self._delivered = max(self._delivered, self._sent - self._given_up - self.waiting)
+        return self._delivered
 
     def put(self, topic: str, key: str, event: HostEvent, received_ms: int, origin: Origin) -> bool:
         """Have an event go out; False where there was no room."""
@@ -164,9 +166,9 @@ class Outward:
         self._producer.poll(0)
         if self._fatal:
             raise BridgeError(f"kafka: {self._name} cannot go on: {self._fatal}")
-        if (delivered := self.delivered) > self._delivered:
+        delivered = self._delivered
+        if self.delivered > delivered:
             REACH.answered()
-        self._delivered = delivered
         if self._unsaid and self._has_room:
             for place, (headers, value) in list(self._unsaid.items()):
                 topic, key, partition, _ = place

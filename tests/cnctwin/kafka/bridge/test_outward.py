@@ -1,5 +1,6 @@
 """Records that find no room are counted, and told as one hole with what holds behind it."""
 
+import time
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 from sparkplug.records.record import Origin, RecordReader
+from tests.wire.mosquitto import free_port
 
 NODE = NodeId("cnc", "edge")
 
@@ -120,3 +122,24 @@ def test_a_record_that_is_refused_for_good_ends_the_bridge(out: outward.Outward,
     out.delivered_one(KafkaError(code), message)
     with pytest.raises(outward.BridgeError, match=r"cnctwin\.cnc\.readings: "):
         out.poll()
+
+
+def test_errors_of_a_cluster_that_is_away_take_nothing_from_what_was_delivered() -> None:
+    """librdkafka counts errors that nobody has taken yet with the records that wait."""
+    out = outward.Outward(KafkaSettings(bootstrap=f"127.0.0.1:{free_port()}"), "bridge-0")
+    deadline_s = time.monotonic() + 30.0
+    while out.waiting == 0:
+        assert time.monotonic() < deadline_s, "no error came"
+        time.sleep(0.02)
+    assert out.delivered == 0
+    assert out.close() == 0
+
+
+def test_what_was_delivered_never_falls(out: outward.Outward) -> None:
+    queue: Any = out._producer
+    assert put(out, 1.0) and put(out, 2.0)
+    queue.waiting = 0
+    assert out.delivered == 2
+    queue.waiting = 1  # an error
+    assert out.delivered == 2
+    queue.waiting = 0
