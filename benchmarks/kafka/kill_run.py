@@ -16,6 +16,7 @@ Needs Java 17 and Maven for Kafka, Mosquitto, and the extra `kafka`. Exits with 
 
 import argparse
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -348,7 +349,7 @@ def main() -> None:
         "--keep-session", action="store_true", help="the broker keeps the bridge's session: nothing may be missing"
     )
     parser.add_argument("--away", type=float, default=defaults.away_s, help="seconds for which a killed Kafka stays away")
-    parser.add_argument("--home", type=Path, help="where logs and data are kept; else a folder that goes with the run")
+    parser.add_argument("--home", type=Path, help="where logs and data are kept, even where all is well")
     parser.add_argument("--session", type=float, help="session_s of the runners; else 30, and 6 with --takeover")
     given = parser.parse_args()
     setup = Setup(
@@ -364,10 +365,16 @@ def main() -> None:
         keeps_session=given.keep_session,
         away_s=given.away,
     )
-    with tempfile.TemporaryDirectory(prefix="cnctwin-kills-") as folder:
-        home = Path(folder) if given.home is None else given.home
-        home.mkdir(parents=True, exist_ok=True)
+    home = Path(tempfile.mkdtemp(prefix="cnctwin-kills-")) if given.home is None else given.home
+    home.mkdir(parents=True, exist_ok=True)
+    is_well = False
+    try:
         is_well = KillRun(setup, home).run()
+    finally:
+        if given.home is None and is_well:
+            shutil.rmtree(home)
+        else:
+            print(f"logs and data: {home}", flush=True)
     sys.exit(0 if is_well else 1)
 
 

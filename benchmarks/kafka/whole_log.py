@@ -59,7 +59,7 @@ def headers_of(message: Message) -> list[tuple[str, Any]]:
 
 
 def behind(bootstrap: str, group: str, names: list[str], partitions: int) -> int:
-    """Return how many records a consumer group has not committed yet."""
+    """Return how many records a consumer group has not committed yet. Ends the program where the cluster does not say."""
     consumer = Consumer({"bootstrap.servers": bootstrap, "group.id": group, "enable.auto.commit": False, "log_level": 0})
     try:
         places = [TopicPartition(name, number) for name in names for number in range(partitions)]
@@ -67,6 +67,9 @@ def behind(bootstrap: str, group: str, names: list[str], partitions: int) -> int
         for one in consumer.committed(places, READ_S_MAX):
             _, high = consumer.get_watermark_offsets(TopicPartition(one.topic, one.partition), READ_S_MAX)
             waiting += high - max(one.offset, 0)
+    except KafkaException as error:
+        raise SystemExit(f"the cluster does not say what {group} has committed: {error.args[0].str()}") from error
+    else:
         return waiting
     finally:
         consumer.close()
