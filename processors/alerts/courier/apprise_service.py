@@ -37,9 +37,15 @@ class AppriseService:
         """Send one notification."""
         kind = self._types.get(message.severity, "info")
         try:
-            is_sent = self._apprise.notify(body=message.text or message.title, title=message.title, notify_type=kind)
+            is_sent = self._apprise.notify(body=_body(message), title=message.title, notify_type=kind, body_format="text")
         except Exception as error:  # of any of some 170 services
             return Outcome(Verdict.UNSURE, f"Apprise failed with {type(error).__name__}; it may have arrived")
         if is_sent:
             return Outcome(Verdict.DELIVERED)
         return Outcome(Verdict.UNSURE, "Apprise says that it failed, and not why; it may have arrived")
+
+
+def _body(message: Notification) -> str:
+    """Return the text with the link in a line of its own, which every service makes one to be followed."""
+    link = f"{message.link_title}: {message.link}" if message.link else ""
+    return "\n".join(filter(None, (message.text, link))) or message.title
