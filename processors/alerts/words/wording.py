@@ -12,14 +12,18 @@ from zoneinfo import ZoneInfo
 from jinja2 import Template, TemplateError, Undefined, UndefinedError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from processors.alerts.state import Alert, Phase
+from processors.alerts.state import Alert, Phase, Severity
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
 
-SENTENCE_MAX, TITLE_MAX, TEXT_MAX = 300, 200, 2000
+SENTENCE_MAX, TITLE_MAX, TEXT_MAX, FILLED_MAX = 300, 200, 2000, 100_000
 SHOWN_MS, SHOWN_MAX = 300_000, 50
 MINUTE_S, HOUR_S, DAY_S = 60.0, 3600.0, 86_400.0
 SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError, RecursionError, MemoryError)
 """Whatever a template of somebody's own may run into."""
+
+
+TRIAL = Alert("machine", "rule_vibration", "twin/rule_vibration", "", Severity.HIGH, 0, Phase.FIRING)
+"""The alert with which templates of somebody's own are tried."""
 
 
 class Missing(Undefined):
@@ -58,6 +62,16 @@ class Wording:
         environment.filters["listed"] = lambda parts: ", ".join(str(part) for part in parts if part)
         self._templates = {text: _compiled(environment, where, text) for where, text in _templates_of(words)}
 
+    def tried(self) -> "Wording":
+        """Return it, once its title and its text could be filled. Raises ValueError naming the one that could not."""
+        told = self._of_notice((TRIAL,), (), Occasion(0.0))
+        for where, text in (("title", self._words.title), ("text", self._words.text)):
+            try:
+                _filled(self._templates[text], told)
+            except SURPRISES as error:
+                raise ValueError(f"{where}: {error}; docs/alerts.md lists what a template sees") from error
+        return self
+
     @property
     def link_title(self) -> str:
         """The text of a link."""
@@ -67,7 +81,9 @@ class Wording:
         """Return one line: which machine, what is wrong there, since when."""
         if occasion.kind in ("test", "heartbeat"):
             return self._words.test if occasion.kind == "test" else self._words.heartbeat
-        return _one_line(self._rendered(self._words.title, self._of_notice(alerts, (), occasion)))[:TITLE_MAX]
+        told = self._of_notice(alerts, (), occasion)
+        plain = f"{told['first']['machine']}: {told['first']['what']}"
+        return (_one_line(self._rendered(self._words.title, told)) or plain)[:TITLE_MAX]
 
     def text(self, alerts: Sequence[Alert], notes: Iterable[str], occasion: Occasion) -> str:
         """Return what else there is to say of each alert; the first one's title is not repeated."""
@@ -154,7 +170,7 @@ class Wording:
             return _one_line(self._rendered(self._words.over, facts))
         if texts.what:
             try:
-                return _one_line(self._templates[texts.what].render(facts))
+                return _one_line(_filled(self._templates[texts.what], facts))
             except UndefinedError:
                 pass  # a figure is not known
             except SURPRISES:
@@ -169,7 +185,7 @@ class Wording:
     def _rendered(self, text: str, values: Mapping[str, Any]) -> str:
         """Return a text filled with values; "" where a value that it writes is not known, or the template fails."""
         try:
-            return self._templates[text].render(values)
+            return _filled(self._templates[text], values)
         except SURPRISES:
             return ""
 
@@ -243,7 +259,11 @@ def _shipped_wording(name: str, time_zone: str, external_url: str) -> Wording:
 def wording(name: str, time_zone: str, external_url: str) -> Wording:
     """Return the wording in a shipped language, or in that of a file. Raises ValueError."""
     if name.endswith(SUFFIX):
-        return Wording(language_in(Path(name)), time_zone, external_url)
+        own = language_in(Path(name))
+        try:
+            return Wording(own, time_zone, external_url).tried()
+        except ValueError as error:
+            raise ValueError(f"language {name}: {error}") from error
     return _shipped_wording(name, time_zone, external_url)
 
 
@@ -262,6 +282,16 @@ def _compiled(environment: ImmutableSandboxedEnvironment, where: str, text: str)
         return environment.from_string(text)
     except TemplateError as error:
         raise ValueError(f"{where}: {error}") from error
+
+
+def _filled(template: Template, values: Mapping[str, Any]) -> str:
+    """Return a template filled with values, cut off where it is far too long: what it writes is not kept in memory."""
+    text = ""
+    for piece in template.generate(values):
+        text += piece
+        if len(text) > FILLED_MAX:
+            break
+    return text
 
 
 def _one_line(text: str) -> str:

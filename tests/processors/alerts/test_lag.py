@@ -35,7 +35,7 @@ def test_twelve_processors_that_are_behind_are_one_notification_that_names_them_
     behind(shop, 31, 18.2, "thermal", "mirror")
     assert shop.alert(NAME, PLANT)["phase"] == "firing"
     (told,) = shop.told
-    assert told.title == "plant: Processors are behind for 10 s"
+    assert told.title == "plant: Processors are behind for 39 s"
     sentence = "processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes"
     assert told.text.startswith(f"P{sentence[1:]} (mirror, thermal)\n")
     assert shop.metrics["okuma", "twin/alert_state"] == "none"
