@@ -155,7 +155,7 @@ class KillRun:
         self._rest(time.monotonic() + self.setup.away_s)
         began_s = time.time()  # what stands in the log by now was there before
         awaited = self.watcher.first_result(began_s), self.watcher.first_data(began_s)
-        self.plant.kafka.start()
+        self.plant.start_kafka()
         self.course.kafka_up_s.append(time.time() - began_s)
         self.course.note("kafka", awaited[0])
         self.course.note("kafka, bridge's data", awaited[1])

@@ -143,6 +143,7 @@ class Plant:
         )
         self.ended: Counter[str] = Counter()
         self.kafka_cpu_s = 0.0
+        self._kafka_is_up = False
         self._load: Process | None = None
         self._pipe: Connection | None = None
         self._began = (0.0, 0.0)
@@ -151,7 +152,7 @@ class Plant:
 
     def start(self) -> None:
         """Start the two brokers, then the bridge and the runners."""
-        self.kafka.start()
+        self.start_kafka()
         self.mqtt.start()
         common = ["--kafka", self.kafka.bootstrap, "--kafka-config", str(self._kafka_config), "--config", str(self.config)]
         common += ["--broker", self.mqtt.address.url]
@@ -190,8 +191,14 @@ class Plant:
 
     def kill_kafka(self) -> None:
         """End Kafka by -9."""
+        self._kafka_is_up = False
         self.kafka_cpu_s += usage_of(self.kafka.pid).cpu_s
         self.kafka.kill()
+
+    def start_kafka(self) -> None:
+        """Start Kafka, and return once it answers."""
+        self.kafka.start()
+        self._kafka_is_up = True
 
     def busy(self) -> tuple[float, float]:
         """Return the seconds since the start, and the busy share of all processors of the computer, in per cent."""
@@ -199,7 +206,9 @@ class Plant:
         return passed_s, 100.0 * (busy_s() - self._began[1]) / passed_s / (os.cpu_count() or 1)
 
     def watch(self) -> None:
-        """Begin again what has ended by itself, as a supervisor would, and count it."""
+        """Begin again what has ended by itself, as a supervisor would, and count it. Kafka is not ours: its end ends the run."""
+        if self._kafka_is_up and not self.kafka.running:
+            raise SystemExit(f"Kafka has ended by itself: {self.kafka.last_words()}")
         for one in (self.bridge, *self.runners.values()):
             if not one.running:
                 self.ended[one.name] += 1

@@ -213,15 +213,16 @@ class KafkaServer:
         until = time.monotonic() + START_S_MAX
         admin = self.admin()
         while True:
-            assert self.running, f"Kafka ended: {self._last_words()}"
-            assert time.monotonic() < until, f"Kafka does not answer after {START_S_MAX:g} s: {self._last_words()}"
+            assert self.running, f"Kafka ended: {self.last_words()}"
+            assert time.monotonic() < until, f"Kafka does not answer after {START_S_MAX:g} s: {self.last_words()}"
             try:
                 if admin.list_topics(timeout=0.5).brokers:
                     return
             except KafkaException:
                 time.sleep(0.05)
 
-    def _last_words(self) -> str:
+    def last_words(self) -> str:
+        """Return the end of its log."""
         return self.log.read_text(errors="replace")[-2000:]
 
     def kill(self) -> None:
