@@ -14,6 +14,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from processors.alerts.state import Alert, Phase, Severity
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
+from twin.vocabulary.twin_signals import RULE_PREFIX, RULE_VIBRATION, TWIN_PREFIX
 
 SENTENCE_MAX, TITLE_MAX, TEXT_MAX, FILLED_MAX = 300, 200, 2000, 100_000
 SHOWN_MS, SHOWN_MAX = 300_000, 50
@@ -22,7 +23,7 @@ SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError,
 """Whatever a template of somebody's own may run into."""
 
 
-TRIAL = Alert("machine", "rule_vibration", "twin/rule_vibration", "", Severity.HIGH, 0, Phase.FIRING)
+TRIAL = Alert("machine", RULE_VIBRATION.removeprefix(TWIN_PREFIX), RULE_VIBRATION, "", Severity.HIGH, 0, Phase.FIRING)
 """The alert with which templates of somebody's own are tried."""
 
 
@@ -161,7 +162,7 @@ class Wording:
         return facts
 
     def _texts(self, alert: Alert) -> Texts:
-        return self._words.alerts.get(alert.name) or Texts(name=_spelled(alert.name))
+        return self._words.alerts.get(alert.name) or Texts(name=_spelled(alert.signal or alert.name))
 
     def _what(self, alert: Alert, facts: Mapping[str, Any]) -> str:
         """Return an alert in one sentence, with figures where all of them are known."""
@@ -304,4 +305,4 @@ def _spelled(name: str) -> str:
     >>> _spelled("twin/rule_lubricant_low")
     'lubricant low'
     """
-    return name.removeprefix("twin/").removeprefix("rule_").replace("_", " ")
+    return name.removeprefix(RULE_PREFIX).removeprefix(TWIN_PREFIX).replace("_", " ")
