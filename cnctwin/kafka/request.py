@@ -6,6 +6,7 @@ When a broker dies in the middle of a request, librdkafka may never return.
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 from typing import Generic, TypeVar
 
 from processors.errors import ProcessorError
@@ -20,34 +21,29 @@ class HungError(ProcessorError):
 
 
 class Request(Generic[T]):
-    """See the module. It begins at once."""
+    """See the module. It begins at once. An executor would wait for its thread when the program ends; this thread is a daemon."""
 
     def __init__(self, ask: Callable[[], T]) -> None:
         self._ask = ask
-        self._answers: list[T] = []
-        self._errors: list[BaseException] = []
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        self._future = Future[T]()
+        threading.Thread(target=self._run, daemon=True).start()
 
     def _run(self) -> None:
         try:
-            self._answers.append(self._ask())
+            self._future.set_result(self._ask())
         except BaseException as error:
-            self._errors.append(error)
+            self._future.set_exception(error)
 
     @property
     def is_over(self) -> bool:
         """True once the answer or an error is there."""
-        return not self._thread.is_alive()
+        return self._future.done()
 
     def answer(self, timeout_s: float | None = None) -> T:
         """Wait for the answer, and return it or raise what came instead. Raises HungError."""
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
+        if not wait([self._future], timeout_s).done:
             raise HungError(f"no answer, not even a refusal, within {timeout_s:g} s")
-        if self._errors:
-            raise self._errors[0]
-        return self._answers[0]
+        return self._future.result()
 
 
 def closed(close: Callable[[], object], what: str) -> bool:

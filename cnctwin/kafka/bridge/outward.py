@@ -58,12 +58,16 @@ class Lot:
 
 
 class Outward:
-    """See the module. `owes`: messages are kept by the broker until `take_safe` returns them; else the cluster's reports of what
-    went well, which cost as much as the records, are left out."""
+    """See the module.
+
+    owes: messages are kept by the broker until `take_safe` returns them; else the cluster's reports of what went well, which
+        cost as much as the records, are left out
+    delivered: the number of records that the cluster had acknowledged at the last `poll`; it never falls
+    """
 
     def __init__(self, settings: KafkaSettings, name: str, *, owes: bool = False) -> None:
-        self.dropped = self.failed = 0
-        self._sent = self._given_up = self._delivered = 0
+        self.dropped = self.failed = self.delivered = 0
+        self._sent = self._given_up = 0
         self._name, self._fatal = name, ""
         self._writer = RecordWriter(name)
         self._lost: Counter[Source] = Counter()
@@ -93,15 +97,8 @@ class Outward:
 
     @property
     def waiting(self) -> int:
-        """The number of records that the cluster has not acknowledged."""
+        """The number of records that the cluster has not acknowledged, and of the client's errors that nobody has taken yet."""
         return len(self._producer)
-
-    @property
-    def delivered(self) -> int:
-        """The number of records that the cluster has acknowledged. It never falls: the client's errors that nobody has taken yet
-        count as waiting, too, so that `waiting` may say more than there are."""
-        self._delivered = max(self._delivered, self._sent - self._given_up - self.waiting)
-        return self._delivered
 
     def put(self, topic: str, key: str, event: HostEvent, received_ms: int, origin: Origin) -> bool:
         """Have an event go out; False where there was no room."""
@@ -166,8 +163,8 @@ class Outward:
         self._producer.poll(0)
         if self._fatal:
             raise BridgeError(f"kafka: {self._name} cannot go on: {self._fatal}")
-        delivered = self._delivered
-        if self.delivered > delivered:
+        if (delivered := self._sent - self._given_up - self.waiting) > self.delivered:  # errors that wait must not make it fall
+            self.delivered = delivered
             REACH.answered()
         if self._unsaid and self._has_room:
             for place, (headers, value) in list(self._unsaid.items()):

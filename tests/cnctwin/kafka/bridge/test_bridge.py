@@ -116,7 +116,7 @@ def test_machines_are_heard_before_the_edge_nodes_are_born(it: Any) -> None:
     assert len(it.log.events) == 3
     assert not it.node.online and it.results.turns == 0
     it.results.known.set()
-    it.bridge._learning._thread.join(WAIT_S_MAX)
+    it.bridge._learning.answer(WAIT_S_MAX)
     it.bridge.turn()
     assert it.node.online and it.results.turns == 1 and len(it.log.events) == 4
 
