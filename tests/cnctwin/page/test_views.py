@@ -150,7 +150,8 @@ def test_the_gap_has_a_place_a_cause_and_a_next_step(visit: Visit) -> None:
 def test_an_alert_is_acknowledged_with_name_and_comment(visit: Visit, shop: Shop) -> None:
     page = visit.open("#/alerts")
     first = page.locator(".alarmcard.firing").first
-    expect(first).to_contain_text("Spindle overload")
+    expect(first.locator("h3")).to_have_text("vmc · Spindle load 131 % for 4 s, limit 120 %")
+    expect(first).to_contain_text("Check the tool for wear")
     first.get_by_role("button", name="Acknowledge").click()
     page.get_by_label("Your name").fill("ada")
     page.get_by_label("Comment").fill("on my way")
