@@ -53,6 +53,7 @@ def trained(runs: list[Path], out: Path | None, *, at: tuple[float, ...] = (), a
 
 def test_labelled_history_gives_a_detector_that_finds_changes_in_another_run(run: Path, tmp_path: Path) -> None:
     said = trained([run], tmp_path / "model")
+    assert "for the beginning of a tool change about" in said and "min a day" in said
     assert "confirms 5 of the 5 changes" in said and "false gates a day" in said and "extrapolated" in said
     detector, _ = load_detector(tmp_path / "model")
     other = recorded(tmp_path / "other.parquet", 2, labelled=False)
@@ -78,6 +79,7 @@ def test_the_same_runs_give_the_same_bytes(run: Path, tmp_path: Path) -> None:
 def test_json_holds_every_figure(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trained([run], tmp_path / "model", as_json=True)
     figures = json.loads(capsys.readouterr().out)
+    assert 0.0 < figures["provisional_s_per_day"] < 864.0 * figures["provisional_per_day"]
     assert figures["changes"] == figures["confirmed"] == 5
     assert set(figures["false_gates"]) >= {"per_day", "low", "high", "null_hours", "is_extrapolated"}
     assert figures["out"] == str(tmp_path / "model")
