@@ -3,7 +3,7 @@
     value, limit, unit      of a rule, as of the moment it was raised; lasted_s: how long that had lasted by then; line: of the NC
     signal, away, …         of a score: how far which signal is from what, in which lines, like what, and how many peers show it
     what_grows, …           a sentence that the processor publishes itself
-    program, tool           what the machine was doing
+    program, tool           what the machine was doing; control: the alarm that the control itself shows then
 
 What is not known is left out. Nothing is taken from a reading that is not good.
 """
@@ -17,10 +17,10 @@ from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
-PROGRAM, TOOL = "program", "tool_number"
+PROGRAM, TOOL, CONTROL_ALARM = "program", "tool_number", "alarm"
 INPUTS = frozenset(
     {
-        *(PROGRAM, TOOL, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_GROWING_SIGNAL),
+        *(PROGRAM, TOOL, CONTROL_ALARM, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_GROWING_SIGNAL),
         *(twin_signals.TOOL_WEAR_PCT, twin_signals.TOOL_PARTS_LEFT, twin_signals.TOOL_PARTS_LEFT_LOW),
         *(twin_signals.TOOL_PARTS_LEFT_HIGH, twin_signals.MACHINE_DRIFT_BASIS),
     }
@@ -56,7 +56,7 @@ def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
     elif signal in _SENTENCES:
         name, metric = _SENTENCES[signal]
         facts[name] = _text(row, metric)
-    facts |= {"program": _text(row, PROGRAM), "tool": _text(row, TOOL)}
+    facts |= {"program": _text(row, PROGRAM), "tool": _text(row, TOOL), "control": _text(row, CONTROL_ALARM)}
     return {name: fact for name, fact in facts.items() if fact != ""}
 
 

@@ -57,6 +57,14 @@ def test_the_same_in_german_by_the_clock_of_the_shop() -> None:
     assert "Seit 18.11.2026 12:06:40 CET, Schwere hoch" in told.text
 
 
+def test_what_the_control_itself_shows_is_told_too() -> None:
+    shop = Shop(external_url=PAGE)
+    shop.set(program="O1701", alarm="EX1012 SPINDLE OVERHEAT")
+    shop.set(load=True, **{RULE_FINDINGS: findings(shop, 112.04)})
+    shop.wait(15)
+    assert "Program O1701, line 210, the control shows: EX1012 SPINDLE OVERHEAT" in shop.told[0].text
+
+
 def test_each_receiver_may_have_its_own_language() -> None:
     receivers = {"desk": DESK["desk"], "phone": PHONE["phone"] | {"language": "de"}}
     titles = {told.receiver: told.title for told in overloaded(receivers=receivers).told}
