@@ -1,4 +1,4 @@
-"""The content of a notification: the JSON of Alertmanager's webhook, version 4, and a title and a text for people."""
+"""The content of a notification for programs: the JSON of Alertmanager's webhook, version 4."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,11 +7,13 @@ from functools import lru_cache
 from typing import Any
 
 from processors.alerts.config import AlertsConfig
-from processors.alerts.state import Alert, Phase, Severity, labels_of
+from processors.alerts.facts import Fact
+from processors.alerts.state import Alert, Severity, labels_of
+from processors.alerts.words.wording import Wording
+from processors.config import Configuration
 
 ALERTS_A_BODY_MAX = 50
-TEXT_MAX = 2000
-TITLE_MAX = 200
+FACTS_TOLD = ("value", "limit", "unit", "program", "tool", "line")
 NEVER = "0001-01-01T00:00:00Z"  # how Go writes no time, and Alertmanager an alert that has no end yet
 
 
@@ -43,30 +45,32 @@ def iso(at_ms: int) -> str:
     return f"{stamp.removesuffix('+00:00')}Z"
 
 
-def as_alert(alert: Alert, config: AlertsConfig) -> dict[str, Any]:
-    """One alert as Alertmanager writes it."""
+def as_alert(alert: Alert, config: AlertsConfig, words: Wording) -> dict[str, Any]:
+    """One alert as Alertmanager writes it; config: that of its machine. It stays the same while nothing happens."""
     labels = labels_of(alert.machine, alert.name, alert.signal, config.labels) | {"severity": alert.severity.value}
-    annotations = {"summary": f"{alert.name} on {alert.machine}"}
-    if alert.context:
-        annotations["description"] = alert.context
-    if alert.unknown:
-        annotations["unknown"] = alert.unknown
-    if alert.acknowledged_by:
-        annotations["acknowledged_by"] = alert.acknowledged_by
+    annotations = {"summary": f"{alert.machine}: {words.summary(alert)}"}
+    told = {"description": words.details(alert), "advice": words.advice(alert)}
+    told |= {name: _written(alert.facts[name]) for name in FACTS_TOLD if name in alert.facts}
+    told |= {"unknown": alert.unknown, "acknowledged_by": alert.acknowledged_by}
+    annotations |= {name: text for name, text in told.items() if text}
     return {
         "status": "firing" if alert.is_on else "resolved",
         "labels": labels,
         "annotations": annotations,
         "startsAt": iso(alert.episode),
         "endsAt": NEVER if alert.is_on else iso(max(alert.ended_ms, alert.episode)),
-        "generatorURL": config.external_url,
+        "generatorURL": words.link(alert),
         "fingerprint": alert.fingerprint,
     }
 
 
-def body(notice: Notice, config: AlertsConfig) -> dict[str, Any]:
+def _written(fact: Fact) -> str:
+    return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
+
+
+def body(notice: Notice, configuration: Configuration[AlertsConfig], words: Wording) -> dict[str, Any]:
     """The webhook's JSON."""
-    shown = [as_alert(alert, config) for alert in notice.alerts[:ALERTS_A_BODY_MAX]]
+    shown = [as_alert(alert, configuration.of(alert.machine), words) for alert in notice.alerts[:ALERTS_A_BODY_MAX]]
     return {
         "version": "4",
         "groupKey": notice.group,
@@ -76,7 +80,7 @@ def body(notice: Notice, config: AlertsConfig) -> dict[str, Any]:
         "groupLabels": dict(notice.group_labels),
         "commonLabels": _common([alert["labels"] for alert in shown]),
         "commonAnnotations": _common([alert["annotations"] for alert in shown]),
-        "externalURL": config.external_url,
+        "externalURL": configuration.default.external_url,
         "alerts": shown,
     }
 
@@ -86,40 +90,6 @@ def _common(dictionaries: Sequence[Mapping[str, str]]) -> dict[str, str]:
         return {}
     first, *rest = dictionaries
     return {name: value for name, value in first.items() if all(other.get(name) == value for other in rest)}
-
-
-def title(notice: Notice) -> str:
-    """One line.
-
-    `[2 firing, high] okuma: rule_vibration, anomaly_alarm`
-    """
-    if notice.kind == "test":
-        return "Test of cnctwin's alerts"
-    if notice.kind == "heartbeat":
-        return "cnctwin is alive"
-    on = [alert for alert in notice.alerts if alert.is_on]
-    worst = worst_of(on)
-    state = f"{len(on)} firing, {worst.value}" if on and worst is not None else "resolved"
-    machines = list(dict.fromkeys(alert.machine for alert in notice.alerts))
-    where = machines[0] if len(machines) == 1 else f"{len(machines)} machines"
-    names = ", ".join(dict.fromkeys(alert.name for alert in (on or notice.alerts)))
-    lead = "after quiet hours: " if notice.kind == "digest" else ""
-    return f"{lead}[{state}] {where}: {names}"[:TITLE_MAX]
-
-
-def text(notice: Notice) -> str:
-    """A line for each alert, then what else is to be said."""
-    return "\n".join([*(_line(alert) for alert in notice.alerts[:ALERTS_A_BODY_MAX]), *notice.notes])[:TEXT_MAX]
-
-
-def _line(alert: Alert) -> str:
-    if not alert.is_on:
-        ended = iso(max(alert.ended_ms, alert.episode))
-        return f"over: {alert.name} on {alert.machine} from {iso(alert.episode)} to {ended}"
-    acknowledged = f", acknowledged by {alert.acknowledged_by}" if alert.phase is Phase.ACKNOWLEDGED else ""
-    context = f" ({alert.context})" if alert.context else ""
-    unknown = f"; now unknown: {alert.unknown}" if alert.unknown else ""
-    return f"{alert.severity.value}: {alert.name} on {alert.machine} since {iso(alert.episode)}{context}{acknowledged}{unknown}"
 
 
 def worst_of(alerts: Iterable[Alert]) -> Severity | None:

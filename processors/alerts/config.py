@@ -7,9 +7,10 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from processors.alarms import alarm_signals, unknown_processors
-from processors.alerts.quiet import QuietHours
+from processors.alerts.quiet import QuietHours, TimeZone
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
+from processors.alerts.words.language import ENGLISH
 from processors.config import CellConfig
 from processors.lag_report import BEHIND_S
 from twin.vocabulary import twin_signals
@@ -103,6 +104,8 @@ class AlertsConfig(CellConfig):
     flap_keep_firing_for_s: float = Field(default=7200.0, ge=0.0, le=7 * 86_400.0)
     forget_after_s: float = Field(default=604_800.0, ge=3600.0, le=365 * 86_400.0)
     external_url: str = Field(default="", max_length=200)
+    language: str = Field(default=ENGLISH, min_length=1, max_length=300)
+    time_zone: TimeZone = "UTC"
     receivers: dict[str, AnyReceiver] = Field(default_factory=dict, max_length=RECEIVERS_MAX)
     routes: tuple[Route, ...] = Field(default=(), max_length=ROUTES_MAX)
     quiet_hours: tuple[QuietHours, ...] = Field(default=(), max_length=ROUTES_MAX)

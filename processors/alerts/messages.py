@@ -18,7 +18,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from processors.alerts.body import Notice
-from processors.alerts.config import AlertsConfig
 from processors.alerts.notification import Name, Notification
 from processors.alerts.outbox import made, recalled, settled
 from processors.alerts.state import (
@@ -29,6 +28,7 @@ from processors.alerts.state import (
     Phase,
     Silence,
 )
+from processors.alerts.words.wordings import Alerts, wording_of
 from twin.vocabulary import topics
 
 TOPIC = topics.ALERTS
@@ -89,7 +89,7 @@ class Delivery(_Message):
     reason: Comment = ""
 
 
-def taken(config: AlertsConfig, state: AlertsState, topic: str, text: str) -> AlertsState:
+def taken(configuration: Alerts, state: AlertsState, topic: str, text: str) -> AlertsState:
     """The state after a message."""
     size_max = OUTBOX_BYTES_MAX if topic.startswith(OUTBOX) else MESSAGE_BYTES_MAX
     try:
@@ -99,7 +99,7 @@ def taken(config: AlertsConfig, state: AlertsState, topic: str, text: str) -> Al
             return recalled(state, Notification.of(text), text)
         document = json.loads(text)
         if topic.startswith(COMMAND):
-            return _command(config, state, topic.removeprefix(COMMAND), document)
+            return _command(configuration, state, topic.removeprefix(COMMAND), document)
         if topic.startswith(DELIVERY):
             return _delivered(state, Delivery.model_validate(document))
     except ValidationError as error:
@@ -122,7 +122,7 @@ def _noted(state: AlertsState, outcome: CommandOutcome) -> AlertsState:
 # Commands.
 
 
-def _command(config: AlertsConfig, state: AlertsState, name: str, document: Any) -> AlertsState:
+def _command(configuration: Alerts, state: AlertsState, name: str, document: Any) -> AlertsState:
     kind = _COMMANDS.get(name)
     if kind is None:
         raise ValueError(f"no command {name[:32]!r}; there are: {', '.join(_COMMANDS)}")
@@ -130,14 +130,14 @@ def _command(config: AlertsConfig, state: AlertsState, name: str, document: Any)
     command: Any = model.model_validate(document)
     if any(outcome.id == command.id for outcome in state.outcomes):
         return state
-    state, is_done, text = do(config, state, command)
+    state, is_done, text = do(configuration, state, command)
     return _noted(state, CommandOutcome(command.id, name, command.by, is_done, text, state.wall_s))
 
 
 Done = tuple[AlertsState, bool, str]
 
 
-def _ack(_: AlertsConfig, state: AlertsState, command: Ack) -> Done:
+def _ack(_: Alerts, state: AlertsState, command: Ack) -> Done:
     alert = state.alerts.get(command.fingerprint)
     if alert is None or not alert.is_on:
         return state, False, f"no alert {command.fingerprint} fires"
@@ -156,7 +156,7 @@ def _ack(_: AlertsConfig, state: AlertsState, command: Ack) -> Done:
     return replace(state, alerts=alerts), True, f"{alert.name} on {alert.machine} is acknowledged"
 
 
-def _silence(_: AlertsConfig, state: AlertsState, command: SilenceCommand) -> Done:
+def _silence(_: Alerts, state: AlertsState, command: SilenceCommand) -> Done:
     if len(state.silences) >= SILENCES_MAX:
         return state, False, f"there are {SILENCES_MAX} silences already; end one with unsilence"
     starts_s = command.starts_s or state.wall_s
@@ -165,20 +165,21 @@ def _silence(_: AlertsConfig, state: AlertsState, command: SilenceCommand) -> Do
     return replace(state, silences=(*state.silences, silence)), True, f"silence {key}"
 
 
-def _unsilence(_: AlertsConfig, state: AlertsState, command: Unsilence) -> Done:
+def _unsilence(_: Alerts, state: AlertsState, command: Unsilence) -> Done:
     left = tuple(silence for silence in state.silences if silence.id != command.silence)
     if len(left) == len(state.silences):
         return state, False, f"there is no silence {command.silence}"
     return replace(state, silences=left), True, f"silence {command.silence} has ended"
 
 
-def _test(config: AlertsConfig, state: AlertsState, command: Trial) -> Done:
-    if command.receiver not in config.receivers:
-        return state, False, f"there is no receiver {command.receiver!r}; there are: {', '.join(config.receivers) or 'none'}"
+def _test(configuration: Alerts, state: AlertsState, command: Trial) -> Done:
+    receivers = configuration.default.receivers
+    if command.receiver not in receivers:
+        return state, False, f"there is no receiver {command.receiver!r}; there are: {', '.join(receivers) or 'none'}"
     key = sha256(command.id.encode("utf-8", "surrogatepass")).hexdigest()[:16]
-    notes = (f"asked for by {command.by}",)
+    notes = (wording_of(configuration, command.receiver).asked_by(command.by),)
     notice = Notice(command.receiver, "test", "test", {}, (), (f"test.{key}",), notes, TEST_EXPIRES_S)
-    item = made(notice, config, state.wall_s, state.clock_s)
+    item = made(notice, configuration, state.wall_s, state.clock_s)
     return replace(state, outbox=state.outbox | {item.id: item}), True, item.id
 
 

@@ -19,6 +19,8 @@ from processors.alerts.routing import Change, changes_for, has_passed
 from processors.alerts.silence import silenced_by
 from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, LastNotice, ReceiverState, Severity
 from processors.alerts.statement import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED
+from processors.alerts.words.wording import Wording
+from processors.alerts.words.wordings import wording_of
 from processors.config import Configuration
 
 HOUR_S = 3600.0
@@ -47,6 +49,7 @@ class _Desk(NamedTuple):
     config: AlertsConfig
     state: AlertsState
     silenced: Mapping[str, str]
+    words: Wording
 
 
 def notified(configuration: Configuration[AlertsConfig], state: AlertsState) -> AlertsState:
@@ -62,11 +65,11 @@ def notified(configuration: Configuration[AlertsConfig], state: AlertsState) -> 
         changes = changes_for(name, known, state, configs, silenced)
         if not receiver.send_resolved:
             known, changes = _without_resolved(known, changes, state.clock_s)
-        desk = _Desk(name, receiver, config, state, silenced)
+        desk = _Desk(name, receiver, config, state, silenced, wording_of(configuration, name))
         known, notices = _due(desk, known, changes)
         for notice in notices:
             if len(outbox) < OUTBOX_MAX:
-                item = made(notice, config, state.wall_s, state.clock_s)
+                item = made(notice, configuration, state.wall_s, state.clock_s)
                 if item.id not in state.settled and item.id not in outbox:
                     outbox[item.id] = item
         receivers[name] = known
@@ -203,7 +206,7 @@ def _send(desk: _Desk, known: ReceiverState, bundle: _Bundle, *, is_held: bool) 
             return known, None
         held, unsaid = known.held_back + 1, known.held_back_unsaid + 1
         return replace(known, held_back=held, held_back_unsaid=unsaid), None
-    notes = (f"{known.held_back_unsaid} notifications were held back before this one",) if known.held_back_unsaid else ()
+    notes = (desk.words.held_back(known.held_back_unsaid),) if known.held_back_unsaid else ()
     alerts = _alerts_in(desk, known, key, news, kind)
     says = tuple(change.says for change in news)
     notice = Notice(desk.name, kind, f"{{}}/{{receiver={desk.name!r}}}:{{{key}}}", labels, alerts, says, notes, EXPIRES_S)

@@ -7,28 +7,34 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, body, iso, text, title, worst_of
-from processors.alerts.config import AlertsConfig
+from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, body, iso, worst_of
 from processors.alerts.statement import Statement, statements_in
+from processors.alerts.words.wording import Occasion
+from processors.alerts.words.wordings import Alerts, wording_of
 
 SAYS_MAX, SAYS_CHARACTERS_MAX = 5000, 200
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-def written(key: str, notice: Notice, config: AlertsConfig, wall_s: float) -> str:
+def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, clock_s: float) -> str:
     """Return the JSON of a notice with the id `key`; `Notification.of` reads it."""
     worst = worst_of(alert for alert in notice.alerts if alert.is_on)
+    words, news = wording_of(configuration, notice.receiver), len(statements_in(notice.says))
+    occasion = Occasion(clock_s, notice.kind, news)
+    first = next((alert for alert in notice.alerts[:news] if alert.is_on), next(iter(notice.alerts), None))
     document = {
         "id": key,
         "receiver": notice.receiver,
         "kind": notice.kind,
         "severity": worst.value if worst is not None else "none",
-        "title": title(notice),
-        "text": text(notice),
+        "title": words.title(notice.alerts, occasion),
+        "text": words.text(notice.alerts, notice.notes, occasion),
+        "link": "" if first is None else words.link(first),
+        "link_title": words.link_title,
         "says": list(notice.says),
         "created": iso(round(wall_s * 1000)),
         "expires_s": wall_s + notice.expires_s,
-        "body": body(notice, config),
+        "body": body(notice, configuration, words),
     }
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False)
 
@@ -43,6 +49,7 @@ class WrittenAlert(_Model):
     fingerprint: Name
     labels: dict[str, str]
     annotations: dict[str, str] = {}
+    started: str = Field(default="", alias="startsAt")
     ended: str = Field(alias="endsAt")
 
 
@@ -57,6 +64,8 @@ class _Document(_Model):
     severity: str
     title: str
     text: str
+    link: str = ""
+    link_title: str = ""
     says: list[Annotated[str, Field(max_length=SAYS_CHARACTERS_MAX)]] = Field(max_length=SAYS_MAX)
     created: str = ""
     expires_s: float
@@ -68,6 +77,7 @@ class Notification:
     """A notification that was read.
 
     statements: those lines of `says` that are about an alert
+    link, link_title: the moment that it is about, on the page; empty without one
     body: Alertmanager's JSON as it was written; `alerts` are the checked ones in it
     """
 
@@ -77,6 +87,8 @@ class Notification:
     severity: str
     title: str
     text: str
+    link: str
+    link_title: str
     says: tuple[str, ...]
     statements: tuple[Statement, ...]
     created: str
@@ -96,6 +108,8 @@ class Notification:
             read.severity,
             read.title,
             read.text,
+            read.link,
+            read.link_title,
             tuple(read.says),
             statements_in(read.says),
             read.created,

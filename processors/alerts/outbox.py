@@ -15,8 +15,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
 
-from processors.alerts.body import Notice, iso
-from processors.alerts.config import AlertsConfig
+from processors.alerts.body import FACTS_TOLD, Notice, iso
 from processors.alerts.notification import Notification, WrittenAlert, written
 from processors.alerts.phases import Beat, caught_up
 from processors.alerts.state import (
@@ -35,6 +34,7 @@ from processors.alerts.state import (
     fingerprint,
 )
 from processors.alerts.statement import OVER, statements_in
+from processors.alerts.words.wordings import Alerts
 from processors.contract import PlainOutput
 from twin.vocabulary import topics
 
@@ -44,6 +44,8 @@ NOT_YET_S = -1e9  # of an item that was not emitted yet
 EMIT_AGAIN_S = 30.0  # an outbox item of unknown fate: the message may have been lost
 CLEAR_AFTER_S = 60.0  # a settled item: long after the snapshot that knows of it
 RECALLED_EXPIRES_S = 600.0
+Shown = Mapping[tuple[str, int], Alert]
+"""The alerts of a notification by fingerprint and episode."""
 
 
 def notification_id(receiver: str, kind: str, says: Iterable[str]) -> str:
@@ -52,10 +54,10 @@ def notification_id(receiver: str, kind: str, says: Iterable[str]) -> str:
     return sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
-def made(notice: Notice, config: AlertsConfig, wall_s: float, clock_s: float) -> Item:
+def made(notice: Notice, configuration: Alerts, wall_s: float, clock_s: float) -> Item:
     """The notification as it stands in the outbox."""
     key = notification_id(notice.receiver, notice.kind, notice.says)
-    payload = written(key, notice, config, wall_s)
+    payload = written(key, notice, configuration, wall_s, clock_s)
     return Item(key, notice.receiver, notice.kind, notice.says, payload, clock_s, NOT_YET_S, clock_s + notice.expires_s)
 
 
@@ -111,7 +113,7 @@ def recalled(state: AlertsState, found: Notification, payload: str) -> AlertsSta
     """
     if found.id in state.outbox:
         return state
-    shown = {one.fingerprint: _alert(one) for one in found.alerts if _is_ours(one)}
+    shown = {(one.fingerprint, _ms(one.started)): _alert(one) for one in found.alerts if _is_ours(one)}
     is_later = found.created > iso(round(state.wall_s * 1000))
     known = state.receivers.get(found.receiver, ReceiverState())
     state = _caught_up(state, found, known, shown if is_later else {})
@@ -122,7 +124,7 @@ def recalled(state: AlertsState, found: Notification, payload: str) -> AlertsSta
     return replace(state, outbox=state.outbox | {item.id: item})
 
 
-def _caught_up(state: AlertsState, found: Notification, known: ReceiverState, shown: Mapping[str, Alert]) -> AlertsState:
+def _caught_up(state: AlertsState, found: Notification, known: ReceiverState, shown: Shown) -> AlertsState:
     """The receiver knows what it was told; the alerts that are `shown`, of no episode yet, are as far as that."""
     told, alerts = dict(known.told), dict(state.alerts)
     beat = Beat(state.wall_s, state.clock_s, 0.0)
@@ -132,7 +134,7 @@ def _caught_up(state: AlertsState, found: Notification, known: ReceiverState, sh
             continue
         is_over = said.what in OVER
         told[said.fingerprint] = LastNotice(said.episode, said.severity, not is_over, state.clock_s, count)
-        written_alert = shown.get(said.fingerprint)
+        written_alert = shown.get((said.fingerprint, said.episode))
         alert = alerts.get(said.fingerprint, written_alert)
         if written_alert is None or alert is None or (alert is written_alert and len(alerts) >= ALERTS_MAX):
             continue
@@ -157,6 +159,11 @@ def _alert(one: WrittenAlert) -> Alert:
         one.fingerprint,
         Severity(labels["severity"]),
         0,
-        ended_ms=round(datetime.fromisoformat(one.ended).replace(tzinfo=UTC).timestamp() * 1000),
-        context=one.annotations.get("description", ""),
+        ended_ms=_ms(one.ended),
+        facts={name: fact for name in FACTS_TOLD if (fact := one.annotations.get(name))},
     )
+
+
+def _ms(moment: str) -> int:
+    """Return a moment in ms since 1970. Raises ValueError where it is none."""
+    return round(datetime.fromisoformat(moment).replace(tzinfo=UTC).timestamp() * 1000)

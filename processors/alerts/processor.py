@@ -18,6 +18,7 @@ from processors.alerts.outbox import emitted, made
 from processors.alerts.report import FIRING, STATE, SUMMARY, machine_outputs, state_output
 from processors.alerts.state import AlertsState
 from processors.alerts.watch import INPUTS, next_beat, watched
+from processors.alerts.words.wordings import read_wordings
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, PlainOutput, PlainSpec, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
@@ -40,7 +41,7 @@ def step(
         if sample.topic.startswith(LAG):
             return lag.heard(state, sample.topic, sample.detail, sample.at_s), ()
         known = state if state.wall_s else replace(state, wall_s=sample.at_s)
-        return taken(configuration.default, known, sample.topic, sample.detail), ()
+        return taken(configuration, known, sample.topic, sample.detail), ()
     if sample.kind in (SampleKind.DATA, SampleKind.BIRTH):
         return _pulsed(configuration.of(sample.machine), state, sample), ()
     if sample.kind is SampleKind.DEATH and len(state.deaths) < DEATHS_MAX:
@@ -64,28 +65,29 @@ def _beat(
     configuration: Configuration[AlertsConfig], before: AlertsState, sample: Sample
 ) -> tuple[AlertsState, Sequence[Output | PlainOutput]]:
     state = watched(configuration, before, sample.cell, next_beat(before, sample.at_s))
-    state = _beaten(configuration.default, notified(configuration, state))
+    state = _beaten(configuration, notified(configuration, state))
     state, outbox = emitted(state)
     state, metrics = machine_outputs(configuration, state, tuple(sample.cell), sample.at_s)
     state, told = state_output(configuration, state)
     return state, (*outbox, *metrics, *told)
 
 
-def _beaten(config: AlertsConfig, state: AlertsState) -> AlertsState:
+def _beaten(configuration: Configuration[AlertsConfig], state: AlertsState) -> AlertsState:
     """The heartbeat of this slot of time, where the last one is gone."""
-    name, every_s = config.heartbeat.receiver, config.heartbeat.every_s
+    heartbeat = configuration.default.heartbeat
+    name, every_s = heartbeat.receiver, heartbeat.every_s
     slot = int(state.wall_s // every_s)
     if not name or slot == state.heartbeat_slot or any(item.kind == HEARTBEAT for item in state.outbox.values()):
         return state
     notice = Notice(name, HEARTBEAT, HEARTBEAT, {"alertname": "cnctwin_heartbeat"}, (), (f"{HEARTBEAT}.{slot}",), (), every_s)
-    item = made(notice, config, state.wall_s, state.clock_s)
+    item = made(notice, configuration, state.wall_s, state.clock_s)
     outbox = state.outbox if item.id in state.settled else state.outbox | {item.id: item}
     return replace(state, heartbeat_slot=slot, outbox=outbox)
 
 
 PROCESSOR = CellProcessor(
     name="alerts",
-    version=2,
+    version=3,
     inputs=INPUTS,
     alarms=alarm_signals,
     outputs=(
@@ -102,6 +104,7 @@ PROCESSOR = CellProcessor(
     state=AlertsState,
     initial=lambda _: AlertsState(),
     step=step,
+    reads=read_wordings,
     listens=(f"{COMMAND}#", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
     beats=True,
 )

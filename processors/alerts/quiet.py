@@ -3,13 +3,24 @@
 import re
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
-from typing import Self
+from typing import Annotated, Self
 from zoneinfo import ZoneInfo
 
-from pydantic import BaseModel, ConfigDict, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, field_validator, model_validator
 
 DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
 _CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d)")
+
+
+def _known(name: str) -> str:
+    try:
+        _zone(name)
+    except Exception as error:
+        raise ValueError(f"no time zone {name!r}; name one as Europe/Berlin, or UTC") from error
+    return name
+
+
+TimeZone = Annotated[str, AfterValidator(_known)]
 
 
 class QuietHours(BaseModel):
@@ -17,20 +28,11 @@ class QuietHours(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    time_zone: str
+    time_zone: TimeZone
     start: str
     end: str
     days: tuple[str, ...] = DAYS
     receivers: tuple[str, ...] = ()  # none named: all
-
-    @field_validator("time_zone")
-    @classmethod
-    def _is_known(cls, name: str) -> str:
-        try:
-            _zone(name)
-        except Exception as error:
-            raise ValueError(f"no time zone {name!r}; name one as Europe/Berlin, or UTC") from error
-        return name
 
     @field_validator("start", "end")
     @classmethod

@@ -75,6 +75,7 @@ class Receiver(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, hide_input_in_errors=True)
 
     send_resolved: bool = True
+    language: str = Field(default="", max_length=300, description="of titles and texts; that of [alerts] where it is empty")
     rate_per_hour: int = Field(default=20, ge=1, le=10_000)
     rate_high_per_hour: int = Field(default=60, ge=10, le=10_000)
     give_up_after_s: float = Field(default=3600.0, ge=0.0, le=86_400.0, description="retries where it was surely not taken")

@@ -11,6 +11,8 @@ from processors.alerts.config import AlertsConfig
 from processors.alerts.notices import silenced_alerts
 from processors.alerts.phases import flaps
 from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Silence
+from processors.alerts.words.wording import Wording
+from processors.alerts.words.wordings import wording_of
 from processors.config import Configuration
 from processors.contract import Output, PlainOutput
 from twin.vocabulary import topics
@@ -86,7 +88,10 @@ def _document(configuration: Configuration[AlertsConfig], state: AlertsState) ->
     configs = {alert.machine: configuration.of(alert.machine) for alert in state.alerts.values()}
     silenced = silenced_alerts(state, configs)
     ordered = sorted(state.alerts.values(), key=lambda a: (-_ORDER[a.phase], -a.severity.rank, a.machine, a.name))
-    shown = [_alert(alert, configs[alert.machine], state, silenced.get(alert.fingerprint, "")) for alert in ordered[:SHOWN_MAX]]
+    words = wording_of(configuration)
+    shown = [
+        _alert(alert, configs[alert.machine], state, words, silenced.get(alert.fingerprint, "")) for alert in ordered[:SHOWN_MAX]
+    ]
     waiting = _waiting(state)
     return {
         "alerts": shown,
@@ -108,10 +113,10 @@ def _document(configuration: Configuration[AlertsConfig], state: AlertsState) ->
     }
 
 
-def _alert(alert: Alert, config: AlertsConfig, state: AlertsState, silence: str) -> dict[str, Any]:
+def _alert(alert: Alert, config: AlertsConfig, state: AlertsState, words: Wording, silence: str) -> dict[str, Any]:
     told = {name: known.told[alert.fingerprint] for name, known in state.receivers.items() if alert.fingerprint in known.told}
     return {
-        **as_alert(alert, config),
+        **as_alert(alert, config, words),
         "phase": alert.phase.value,
         "severity": alert.severity.value,
         "severities": [severity.value for severity in alert.severities],

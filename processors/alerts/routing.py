@@ -1,6 +1,7 @@
 """Routing: the receivers that an alert goes to, and what is news to each of them."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from processors.alerts.config import AlertsConfig, Route
@@ -48,8 +49,29 @@ def _matches(route: Route, alert: Alert) -> bool:
     return named and alert.severity.rank >= route.severity_min.rank
 
 
+def news_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock_s: float) -> list[Change]:
+    """Return what is news to a receiver that was last told `told`: of an alert that fires again while the receiver believes that
+    an earlier episode fires, the end of that one comes first."""
+    change = change_of(alert, told, config, clock_s)
+    if change is None:
+        return []
+    if change.what != FIRING or told is None or not told.is_firing or told.episode == alert.episode:
+        return [change]
+    return [Change(_over(alert, told), RESOLVED, told.count), change]
+
+
+def _over(alert: Alert, told: LastNotice) -> Alert:
+    """Return the earlier episode that a receiver was told of. Where another one lay between, it was over when that one began."""
+    began_ms, ended_ms = alert.earlier
+    if began_ms != told.episode:
+        ended_ms = began_ms
+    return replace(
+        alert, phase=Phase.RESOLVED, episode=told.episode, ended_ms=max(ended_ms, told.episode), severity=told.severity, facts={}
+    )
+
+
 def change_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock_s: float) -> Change | None:
-    """Return what is news to a receiver that was last told `told`."""
+    """Return the newest of what is news to a receiver that was last told `told`."""
     if not alert.is_on:
         # One that pends again is waited for: it fires, or is over after all.
         if told is not None and told.is_firing:
@@ -78,7 +100,7 @@ def changes_for(
     receiver: str, known: ReceiverState, state: AlertsState, configs: Mapping[str, AlertsConfig], silenced: Mapping[str, str]
 ) -> list[Change]:
     """All news for one receiver, the worst first."""
-    changes = []
+    changes: list[list[Change]] = []
     for key, alert in state.alerts.items():
         if key in silenced:
             continue
@@ -86,7 +108,7 @@ def changes_for(
         told_by = (receiver,) if told is not None and told.is_firing else ()
         if receiver not in receivers_of(alert, config, state.clock_s, told_by):
             continue
-        change = change_of(alert, told, config, state.clock_s)
-        if change is not None:
-            changes.append(change)
-    return sorted(changes, key=lambda change: (-change.alert.severity.rank, change.alert.machine, change.alert.name))
+        if news := news_of(alert, told, config, state.clock_s):
+            changes.append(news)
+    changes.sort(key=lambda news: (-news[-1].alert.severity.rank, news[-1].alert.machine, news[-1].alert.name))
+    return [change for news in changes for change in news]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from hashlib import sha256
 
+from processors.alerts.facts import Facts
 from processors.lag_report import LagReport
 
 ALERTS_MAX = 5000
@@ -54,6 +55,7 @@ class Alert:
     fired_s: when this episode fired, by clock_s
     rises_s: when it last fired, or would have but for being kept firing; empty where it never has
     severities: all that this episode had
+    facts: what was known of the alarm and of the machine when the episode began
     """
 
     machine: str
@@ -76,7 +78,7 @@ class Alert:
     severities: tuple[Severity, ...] = ()
     acknowledged_by: str = ""
     comment: str = ""
-    context: str = ""
+    facts: Facts = field(default_factory=dict)
     undelivered: bool = False
 
     @property

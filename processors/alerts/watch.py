@@ -7,20 +7,19 @@ from typing import NamedTuple
 
 from processors.alerts import lag
 from processors.alerts.config import MACHINE_OFFLINE, NAMED, PROCESSORS_BEHIND, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts.facts import INPUTS as FACT_INPUTS
+from processors.alerts.facts import Facts, facts_of
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.anomaly.parts.alarms.words import in_words
-from twin.vocabulary.twin_signals import ANOMALY_ALARM, ANOMALY_WHY, SEVERITY, TWIN_PREFIX
+from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
 
-PROGRAM, TOOL = "program", "tool_number"
-INPUTS = frozenset({*NAMED, SEVERITY, PROGRAM, TOOL, ANOMALY_WHY})
+INPUTS = frozenset({*NAMED, SEVERITY, *FACT_INPUTS})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
-CONTEXT_MAX = 100
 OFFLINE = "the machine is offline"
 NOT_LOST = Condition(False, "", 0)
 _STALE = Quality.STALE
@@ -29,14 +28,14 @@ Row = Mapping[str, Reading]
 
 
 class Watched(NamedTuple):
-    """One thing that may be an alert, as it stands now; `context`: what there is to say of it, if not what the machine does."""
+    """One thing that may be an alert, as it stands now; `facts`: of what is no signal of a machine."""
 
     machine: str
     name: str
     signal: str
     rule: Rule
     condition: Condition
-    context: str = ""
+    facts: Facts | None = None
 
 
 def next_beat(state: AlertsState, wall_s: float) -> Beat:
@@ -63,11 +62,11 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
             alert = begun(_fresh(one, config), one.rule, one.condition, beat)
         else:
             overflowed += 1
-        if alert is not None and one.context:
+        if alert is not None and one.facts is not None:
             if before is None or before.phase is not alert.phase:
-                alert = replace(alert, context=one.context)
+                alert = replace(alert, facts=one.facts)
         elif alert is not None and (before is None or before.episode != alert.episode):
-            alert = replace(alert, context=_context(one.signal, cell.get(one.machine, {})))
+            alert = replace(alert, facts=facts_of(one.signal, cell.get(one.machine, {}), alert.episode))
         if alert is not None and _is_remembered(alert, state, beat, config):
             alerts[alert.fingerprint] = alert
     for left in known.values():  # neither its machine nor its rule is known any more
@@ -145,7 +144,7 @@ def _processors(
         state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s
     )
     if condition.stands or before is not None:
-        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, sentence)
+        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, {"sentence": sentence} if sentence else {})
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:
@@ -182,24 +181,6 @@ def _may_rise(config: AlertsConfig, alert: Alert) -> bool:
 
 def _says_high(reading: Reading | None) -> bool:
     return reading is not None and reading.quality is Quality.GOOD and reading.value == Severity.HIGH.value
-
-
-def _context(signal: str, row: Row) -> str:
-    """Return what the machine was doing, for the person who is woken up, and of a score why it alarms."""
-    parts = []
-    why = row.get(ANOMALY_WHY) if signal == ANOMALY_ALARM else None
-    if why is not None and why.quality is Quality.GOOD and isinstance(why.value, str) and (sentence := in_words(why.value)):
-        parts.append(sentence)
-    for name, word in ((PROGRAM, "program"), (TOOL, "tool")):
-        reading = row.get(name)
-        if (
-            reading is not None
-            and reading.quality is Quality.GOOD
-            and isinstance(reading.value, (str, int))
-            and reading.value != ""
-        ):
-            parts.append(f"{word} {reading.value}"[:CONTEXT_MAX])
-    return ", ".join(parts)
 
 
 def _is_remembered(alert: Alert, state: AlertsState, beat: Beat, config: AlertsConfig) -> bool:

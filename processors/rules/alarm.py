@@ -22,12 +22,24 @@ class LimitState(Enum):
 _OVER, _UNDER, _UNKNOWN = LimitState.OVER, LimitState.UNDER, LimitState.UNKNOWN
 
 
+class Finding(NamedTuple):
+    """The value that is over which limit, both in `unit`; `text` says so in words."""
+
+    text: str = ""
+    value: float = 0.0
+    limit: float = 0.0
+    unit: str = ""
+
+
+NO_FINDING = Finding()
+
+
 class Judgement(NamedTuple):
-    """The finding of a rule at one moment. `reason`: why it is unknown; `finding`: what is over which limit, to be read."""
+    """The judgement of a rule at one moment. `reason`: why it is unknown; `finding`: what is over its limit."""
 
     limit_state: LimitState
     reason: str = ""
-    finding: str = ""
+    finding: Finding = NO_FINDING
 
 
 BETWEEN, UNDER, EXCUSED = Judgement(LimitState.BETWEEN), Judgement(LimitState.UNDER), Judgement(LimitState.EXCUSED)
@@ -38,9 +50,9 @@ def unknown(reason: str) -> Judgement:
     return Judgement(_UNKNOWN, reason)
 
 
-def over(finding: str) -> Judgement:
-    """Return the judgement that a value is over its limit."""
-    return Judgement(_OVER, "", finding)
+def over(text: str, value: float, limit: float, unit: str) -> Judgement:
+    """Return the judgement that a value is over its limit, or under one that is a least."""
+    return Judgement(_OVER, "", Finding(text, value, limit, unit))
 
 
 class Timing(NamedTuple):
@@ -53,14 +65,16 @@ class Timing(NamedTuple):
 class Latch(NamedTuple):
     """One rule's alarm.
 
-    alarm_s: since when the condition held that raised it; None = no alarm. `finding` is of the moment at which it was raised
+    alarm_s: since when the condition held that raised it; None = no alarm
+    finding, line: what was over which limit, and in which NC line, when it was raised; line None: not known
     over_s, under_s: since when the value has been over, under, without a break
     """
 
     alarm_s: float | None = None
-    finding: str = ""
+    finding: Finding = NO_FINDING
     over_s: float | None = None
     under_s: float | None = None
+    line: int | None = None
 
     @property
     def is_alarm(self) -> bool:
@@ -93,15 +107,15 @@ def latched(latch: Latch, judgement: Judgement, timing: Timing, at_s: float) -> 
         over_s = at_s if latch.over_s is None else latch.over_s
         if alarm_s is None and at_s - over_s >= timing.dwell_s:
             return Latch(over_s, judgement.finding, over_s)
-        return latch if latch.over_s is not None and latch.under_s is None else Latch(alarm_s, latch.finding, over_s)
+        return latch if latch.over_s is not None and latch.under_s is None else latch._replace(over_s=over_s, under_s=None)
     if limit_state is _UNDER:
         under_s = at_s if latch.under_s is None else latch.under_s
         if at_s - under_s >= timing.clear_s:
             return IDLE
-        return latch if latch.under_s is not None and latch.over_s is None else Latch(alarm_s, latch.finding, None, under_s)
+        return latch if latch.under_s is not None and latch.over_s is None else latch._replace(over_s=None, under_s=under_s)
     return rested(latch)
 
 
 def rested(latch: Latch) -> Latch:
     """The alarm as it is, both clocks stopped."""
-    return latch if latch.over_s is None and latch.under_s is None else Latch(latch.alarm_s, latch.finding)
+    return latch if latch.over_s is None and latch.under_s is None else latch._replace(over_s=None, under_s=None)

@@ -105,7 +105,9 @@ def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample, evidence:
     needed_s = limits.tool_broken_s * (1.0 + evidence.misled) + (HELD_S if sample.kind is SampleKind.TICK else 0.0)
     if evidence.rate <= 0.0 or evidence.seconds + ROUNDING_S < needed_s:
         return BETWEEN
-    return over(f"the cut takes {max(cut_pct, 0.0):.0f} % of spindle load where the twin expects {least_pct:.0f} % or more")
+    taken_pct = max(cut_pct, 0.0)
+    text = f"the cut takes {taken_pct:.0f} % of spindle load where the twin expects {least_pct:.0f} % or more"
+    return over(text, taken_pct, least_pct, "%")
 
 
 def load_over_expected(limits: ExpectedLimits, moves: Motion, sample: Sample) -> Judgement:
@@ -121,4 +123,5 @@ def load_over_expected(limits: ExpectedLimits, moves: Motion, sample: Sample) ->
     limit_pct = ratio * most_pct + limits.over_expected_margin_pct
     if cut_pct <= limit_pct:
         return UNDER if cut_pct <= CLEAR_OVER * limit_pct else BETWEEN
-    return over(f"the cut takes {cut_pct:.0f} % of spindle load, over {limit_pct:.0f} %, where the twin expects {most_pct:.0f} %")
+    text = f"the cut takes {cut_pct:.0f} % of spindle load, over {limit_pct:.0f} %, where the twin expects {most_pct:.0f} %"
+    return over(text, cut_pct, limit_pct, "%")

@@ -6,6 +6,7 @@ inputs are unknown is null, never a silent no. Where a rule alarms, the severity
 medium. A new rule is a function in a file `processors/rules/<noun>.py` and a row here.
 """
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -41,7 +42,9 @@ from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
 ANOMALY, RULE = twin_signals.ANOMALY_ALARM, twin_signals.RULE_PREFIX
-ZONE, SEVERITY, DETAIL = "twin/vibration_zone", twin_signals.SEVERITY, twin_signals.RULE_DETAIL
+ZONE, SEVERITY = "twin/vibration_zone", twin_signals.SEVERITY
+DETAIL, FINDINGS = twin_signals.RULE_DETAIL, twin_signals.RULE_FINDINGS
+LINE = "nc_line"
 NONE, MEDIUM, HIGH = "none", "medium", "high"
 NO_ANOMALY = f"{ANOMALY} is not offered"
 _HOLE, _GOOD, _OVER, _UNKNOWN = SampleKind.HOLE, Quality.GOOD, LimitState.OVER, LimitState.UNKNOWN
@@ -170,6 +173,8 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
         if latch is not IDLE or limit_state is _OVER:  # an idle alarm stays idle otherwise, as nearly always
             before, latch = latch, latched(latch, judgement, timing, at_s)
             if latch is not before:
+                if before.alarm_s is None and latch.alarm_s is not None:
+                    latch = latch._replace(line=_line(sample))
                 latches = {rule.name: latches.get(rule.name, IDLE) for rule in RULES} | {name: latch}
         stands.append(judgement.reason if limit_state is _UNKNOWN else None if latch.alarm_s is None else latch)
     zone_name = no_zone if zone is None else zone.value
@@ -204,6 +209,7 @@ def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool
     """All metrics; `zone` says why there is none where there is none. The same objects are the answer while nothing changes."""
     outputs: list[Output] = []
     alarms: list[str] = []
+    findings: dict[str, dict[str, float | int | str]] = {}
     unknown: list[str] = []
     judged = False
     for rule, stand in zip(RULES, stands, strict=True):
@@ -215,16 +221,22 @@ def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool
         judged = True
         outputs.append(Output(rule.metric, stand is not None))
         if stand is not None and stand.alarm_s is not None:
-            alarms.append(f"{rule.name}: {stand.finding}, since {_utc(stand.alarm_s)}")
+            text, value, limit, unit = stand.finding
+            alarms.append(f"{rule.name}: {text}, since {_utc(stand.alarm_s)}")
+            at_ms = round(stand.alarm_s * 1000)
+            found = findings[rule.name] = {"value": round(value, 3), "limit": round(limit, 3), "unit": unit, "since": at_ms}
+            if stand.line is not None:
+                found["line"] = stand.line
     outputs.append(Output(ZONE, zone) if has_zone else Output.null(ZONE, zone))
     if not judged:
         reason = outputs[0].reason or ""
-        outputs.append(Output.null(DETAIL, reason))
+        outputs += [Output.null(DETAIL, reason), Output.null(FINDINGS, reason)]
         if isinstance(anomaly, str):
             return (*outputs, Output.null(SEVERITY, f"no rule and no score can be judged: {reason}; {anomaly}"))
     else:
         left = f" (not judged: {', '.join(unknown)})" if unknown else ""
         outputs.append(Output(DETAIL, "; ".join(alarms or [NONE]) + left))
+        outputs.append(Output(FINDINGS, json.dumps(findings, separators=(",", ":")) if findings else "{}"))
     return (*outputs, Output(SEVERITY, HIGH if alarms else MEDIUM if anomaly is True else NONE))
 
 
@@ -239,6 +251,12 @@ def _anomaly(sample: Sample) -> bool | str:
     return why_unknown(reading) or f"{ANOMALY} is no BOOLEAN"
 
 
+def _line(sample: Sample) -> int | None:
+    reading = sample.row.get(LINE)
+    value = None if reading is None or reading.quality is not _GOOD else reading.value
+    return value if isinstance(value, int) else None
+
+
 def _utc(at_s: float) -> str:
     """A moment as people read it, to the second."""
     try:
@@ -250,13 +268,14 @@ def _utc(at_s: float) -> str:
 _INFERRED = Provenance.INFERRED
 PROCESSOR = Processor(
     name="rules",
-    version=2,
-    inputs=frozenset({ANOMALY}).union(*(rule.reads for rule in RULES)),
+    version=3,
+    inputs=frozenset({ANOMALY, LINE}).union(*(rule.reads for rule in RULES)),
     outputs=(
         *(OutputSpec(rule.metric, DataType.BOOLEAN, None, rule.meaning, _INFERRED, is_alarm=True) for rule in RULES),
         OutputSpec(ZONE, DataType.STRING, None, "ISO zone of the vibration's velocity, A to D", _INFERRED),
         OutputSpec(SEVERITY, DataType.STRING, None, "none; medium: only the anomaly score alarms; high: a rule does", _INFERRED),
         OutputSpec(DETAIL, DataType.STRING, None, "which rules alarm: value, limit, since when; and which cannot say", _INFERRED),
+        OutputSpec(FINDINGS, DataType.STRING, None, "JSON: value, limit, unit, since when of each rule that alarms", _INFERRED),
     ),
     config=Config,
     state=State,

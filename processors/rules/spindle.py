@@ -125,7 +125,7 @@ def load_over_limit(limits: SpindleLimits, moves: Motion, load: Known) -> Judgem
     if moves.is_ramping:
         return EXCUSED
     judgement = within(load_pct, limits.load_limit_pct, limits.load_clear_pct)
-    return judgement or over(f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
+    return judgement or over(f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %", load_pct, limits.load_limit_pct, "%")
 
 
 def load_without_feed(limits: SpindleLimits, moves: Motion, load: Known, sample: Sample) -> Judgement:
@@ -143,7 +143,8 @@ def load_without_feed(limits: SpindleLimits, moves: Motion, load: Known, sample:
     if judgement is not None:
         return judgement
     limit = f"{load_pct:.0f} % over {limits.no_feed_load_pct:g} %"
-    return over(f"{LOAD} {limit} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
+    text = f"{LOAD} {limit} with {FEED} below {limits.no_feed_mm_min:g} mm/min"
+    return over(text, load_pct, limits.no_feed_load_pct, "%")
 
 
 def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:

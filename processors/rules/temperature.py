@@ -110,4 +110,5 @@ def thermal_runaway(limits: TemperatureLimits, trend: Trend, temperature: Known)
     if slope is None:
         return limits.too_short
     judgement = within(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
-    return judgement or over(f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")
+    text = f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min"
+    return judgement or over(text, slope, limits.runaway_k_per_min, "K/min")

@@ -142,4 +142,5 @@ def vibration(limits: VibrationLimits, moves: Motion, zone: Zone | None, found: 
     if ZONES.index(zone) < ZONES.index(limits.vibration_alarm_zone):
         return UNDER
     boundary = limits.boundaries_mm_s[ZONES.index(limits.vibration_alarm_zone) - 1]
-    return over(f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s")
+    text = f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s"
+    return over(text, velocity_mm_s, boundary, "mm/s")

@@ -20,7 +20,7 @@ from twin.transient.evidence import UNKNOWN, Weighing, weighing_of
 from twin.transient.extremes import FalseRate, false_rate, threshold_for
 from twin.transient.learning import Learned, fitted, learned
 from twin.transient.level import levels
-from twin.transient.replay import Candidate, candidates, replayed
+from twin.transient.replay import Candidate, Outcome, candidates, replayed
 from twin.transient.stream import Stream
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,8 @@ class Trained:
     captured: times of changes that the template was found in; not_found: of those that it was not
     asked_score: the threshold for the rate that was asked for, None = too little null to say
     rate: of the threshold that is used, by the signal alone
-    provisional_per_day: gates that open and are retracted; confirmed: known changes that the detector confirms, of `changes`
+    provisional_per_day: gates that open and are retracted; provisional_s_per_day: the time that these hold scores back
+    confirmed: known changes that the detector confirms, of `changes`
     weighed_peaks: null events that the weighing takes for a change; copies_found: share of the copies, by the signal alone
     """
 
@@ -69,6 +70,7 @@ class Trained:
     asked_score: float | None
     rate: FalseRate
     provisional_per_day: float
+    provisional_s_per_day: float
     changes: int
     confirmed: int
     weighed_peaks: int | None
@@ -111,6 +113,7 @@ def trained(streams: Sequence[Stream], settings: TrainingSettings, rng: np.rando
         asked_score=asked_score,
         rate=false_rate(peaks, hours, limits.pattern_score, rng),
         provisional_per_day=24.0 * opened / hours,
+        provisional_s_per_day=24.0 * sum(_open_s(stream, outcome, settings) for stream, outcome in outcomes) / hours,
         changes=len(changes),
         confirmed=sum(
             any(one.begun_s - settings.after_s <= at_s <= one.at_s + settings.after_s for one in outcome.confirmed)
@@ -175,6 +178,12 @@ def _distance_max(own: Sequence[PatternMatch], copied: Sequence[PatternMatch]) -
     of_copies = [float(np.quantile([one.distance for one in copied], 1.0 - FAILING))] if copied else []
     of_own = [float(np.median([one.distance for one in own])) * LARGER] if own else []
     return max([0.2, *of_copies, *of_own]) / MARGIN
+
+
+def _open_s(stream: Stream, outcome: Outcome, settings: TrainingSettings) -> float:
+    """Return how long the gate was open where no known change may have caused it, s."""
+    times_s = stream.begin_s + np.flatnonzero(outcome.active) * stream.period_s
+    return stream.period_s * sum(not _is_near(stream, at_s, settings) for at_s in times_s.tolist())
 
 
 def _is_near(stream: Stream, at_s: float, settings: TrainingSettings) -> bool:

@@ -100,6 +100,8 @@ RULES = (
     RULE_LOAD_OVER_EXPECTED,
 )
 RULE_DETAIL = f"{RULE_PREFIX}detail"
+RULE_FINDINGS = f"{RULE_PREFIX}findings"
+"""JSON text: by the name of each rule that alarms value, limit, unit and since when (ms), as of the moment it was raised."""
 SEVERITY = f"{TWIN_PREFIX}severity"
 
 # events

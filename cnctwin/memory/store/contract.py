@@ -9,7 +9,7 @@ says again after a death is a sample as of the birth, since it holds again.
 Raw and derived are apart: what a processor says (`twin/…`, of a node `twin-…`) is `cnc_twin_state`, all else `cnc_raw`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -46,12 +46,31 @@ class Appended(NamedTuple):
 
 
 class Pinned(NamedTuple):
-    """A stretch of a machine that no sweep may take, and why. Stretches that overlap stay two: each has its reason."""
+    """A stretch of a machine that no sweep may take, and why."""
 
     machine: str
     from_ms: int
     to_ms: int
     reason: str
+
+
+def merged(pins: Iterable[Pinned]) -> list[Pinned]:
+    """Merge the stretches of a machine that overlap or touch into one with all their reasons; oldest first.
+
+    >>> merged([Pinned("vmc", 0, 20, "anomaly_alarm"), Pinned("vmc", 10, 30, "load"), Pinned("vmc", 15, 40, "anomaly_alarm")])
+    [Pinned(machine='vmc', from_ms=0, to_ms=40, reason='anomaly_alarm, load')]
+    """
+    last: dict[str, int] = {}
+    stretches: list[tuple[Pinned, dict[str, None]]] = []
+    for pin in sorted(pins, key=lambda pin: (pin.from_ms, pin.to_ms, pin.machine, pin.reason)):
+        at = last.get(pin.machine)
+        if at is not None and pin.from_ms <= stretches[at][0].to_ms:
+            stretch, reasons = stretches[at]
+            stretches[at] = (stretch._replace(to_ms=max(stretch.to_ms, pin.to_ms)), reasons | {pin.reason: None})
+        else:
+            last[pin.machine] = len(stretches)
+            stretches.append((pin, {pin.reason: None}))
+    return [stretch._replace(reason=", ".join(reasons)) for stretch, reasons in stretches]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +183,7 @@ class Store(Protocol):
         """Keep a stretch from being swept, in whole, also what of it is still to come. Twice the same is once."""
 
     def pins(self, machine: str | None = None) -> list[Pinned]:
-        """All pins, oldest first."""
+        """Return all pins, oldest first; those of a machine that overlap are one, with all their reasons."""
 
     def keep_snapshot(self, *snapshots: Snapshot) -> None:
         """Keep one snapshot an hour of each processor and unit: the first of the hour. All that are given are kept, or none."""

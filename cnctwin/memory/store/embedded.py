@@ -22,6 +22,7 @@ from cnctwin.memory.store.contract import (
     Status,
     StoreError,
     Tidied,
+    merged,
 )
 from cnctwin.memory.store.database import FILE_NAME, Readers
 from cnctwin.memory.store.retention import Retention
@@ -103,12 +104,10 @@ class EmbeddedStore:
     # What anybody may ask.
 
     def pins(self, machine: str | None = None) -> list[Pinned]:
-        """All pins, oldest first."""
+        """Return all pins, oldest first; those of a machine that overlap are one, with all their reasons."""
         with self._readers.snapshot() as db:
-            rows = db.execute(
-                "SELECT machine, from_ms, to_ms, reason FROM pins ORDER BY from_ms, to_ms, machine, reason"
-            ).fetchall()
-        return [pinned for row in rows if machine in (None, (pinned := Pinned(*row)).machine)]
+            rows = db.execute("SELECT machine, from_ms, to_ms, reason FROM pins WHERE ?1 IS NULL OR machine = ?1", (machine,))
+            return merged(Pinned(*row) for row in rows)
 
     def snapshot_before(self, processor: str, unit: str, at_ms: int) -> Snapshot | None:
         """The last snapshot that was received before a moment."""

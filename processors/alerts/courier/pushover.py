@@ -1,6 +1,7 @@
 """Pushover (pushover.net/api, pushover.net/api/receipts).
 
-POST /1/messages.json                  token, user, message, title, priority; emergency (2): retry >= 30, expire <= 10800
+POST /1/messages.json                  token, user, message, title, priority, url, url_title; emergency (2): retry >= 30,
+                                       expire <= 10800
 GET  /1/receipts/<receipt>.json        acknowledged, acknowledged_by_device, expired; at most every 5 s
 POST /1/receipts/<receipt>/cancel.json
 """
@@ -15,7 +16,7 @@ from processors.alerts.courier.secret import redacted
 from processors.alerts.notification import Notification
 from processors.alerts.receivers import PushoverReceiver
 
-MESSAGE_MAX, TITLE_MAX = 1024, 250
+MESSAGE_MAX, TITLE_MAX, URL_MAX, URL_TITLE_MAX = 1024, 250, 512, 100
 EMERGENCY = 2
 HEADERS = {"User-Agent": "cnctwin"}
 
@@ -89,6 +90,8 @@ class Pushover:
         }
         if priority == EMERGENCY:
             fields |= {"retry": str(receiver.retry_s), "expire": str(receiver.expire_s)}
+        if message.link and len(message.link) <= URL_MAX:
+            fields |= {"url": message.link, "url_title": message.link_title[:URL_TITLE_MAX]}
         if receiver.device:
             fields["device"] = receiver.device
         return fields

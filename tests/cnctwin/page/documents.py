@@ -21,7 +21,11 @@ def alert(machine: str, name: str, severity: str, phase: str, ago_s: float, **mo
     return {
         "status": "resolved" if phase == "resolved" else "firing",
         "labels": {"machine": machine, "alertname": name, "severity": severity},
-        "annotations": {"summary": f"{name} on {machine}", "description": more.pop("description", "")},
+        "annotations": {
+            "summary": f"{machine}: {more.pop('sentence', name)}",
+            "description": more.pop("description", ""),
+            "advice": more.pop("advice", ""),
+        },
         "startsAt": iso(began),
         "endsAt": iso(began + 90_000) if phase == "resolved" else "0001-01-01T00:00:00Z",
         "fingerprint": f"{zlib.crc32(f'{machine} {name}'.encode()):016x}",
@@ -56,7 +60,9 @@ def alerts(machines: list[str]) -> dict[str, Any]:
                 "high",
                 "firing",
                 75,
-                description="spindle load 131 % for 4 s while feeding; program BASE-PLATE.NC, tool 5",
+                sentence="Spindle load 131 % for 4 s, limit 120 %",
+                description="program BASE-PLATE.NC, tool 5, line 210",
+                advice="Check the tool for wear and packed chips, and the feed and its override.",
             ),
             alert(
                 first,
@@ -64,7 +70,8 @@ def alerts(machines: list[str]) -> dict[str, Any]:
                 "medium",
                 "firing",
                 320,
-                description="adjusted score 0.27 over 0.12; axis_z_load_pct, vibration_rms_g",
+                sentence="Load of axis Z 31 % above 12 earlier parts",
+                description="lines 210 to 260, program BASE-PLATE.NC, tool 5",
             ),
             alert(
                 other,

@@ -38,6 +38,7 @@ class Shop:
         self.period_s = period_s
         self.offline_since: dict[str, int] = {}
         self.other: dict[str, dict[str, SignalValue]] = {}
+        self.without: dict[str, re.Pattern[str]] = {}  # by machine: the signals that it does not have
         self.answers: dict[str, Callable[[str, dict[str, Any] | None], Answer]] = {}
         self.token: str | None = None
         self.me: dict[str, Any] = {"user": None, "role": "administrator", "logs_out": False}
@@ -49,7 +50,9 @@ class Shop:
     def told(self, machine: str, t_ms: int) -> tuple[dict[str, SignalValue], int]:
         """What a machine says at a moment, and of when that is."""
         t_ms = min(t_ms, self.offline_since.get(machine, t_ms))
-        return {**signals(self.numbers[machine], t_ms / 1000.0), **self.other.get(machine, {})}, t_ms
+        all_of_it = {**signals(self.numbers[machine], t_ms / 1000.0), **self.other.get(machine, {})}
+        without = self.without.get(machine)
+        return {name: one for name, one in all_of_it.items() if without is None or not without.fullmatch(name)}, t_ms
 
     def fleet(self) -> dict[str, Any]:
         """As the stream begins."""

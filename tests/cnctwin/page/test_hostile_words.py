@@ -54,7 +54,7 @@ def test_alerts_jobs_events_and_validations_of_such_words_are_shown(visit: Visit
     figure = {"quantity": word, "measure": word, "value": 1.0, "verdict": word}
     night = {"machine": "vmc", "t": 1, "verdict": word, "figures": [figure], "nights": [], "retrain": False, "over_in_a_row": {}}
     shop.answers["/validation/vmc"] = lambda _path, _body: (200, night)
-    for view in ("alerts", "jobs", "replay/vmc", "validation/vmc"):
+    for view in ("alerts", "jobs", "replay/vmc", "parts/vmc"):
         page = visit.open(f"#/{view}")
         page.wait_for_timeout(200)
         expect(page.locator("main")).not_to_contain_text("native code")

@@ -83,7 +83,7 @@ def test_the_page_and_the_interface_understand_each_other(
     expect(tile.locator(".big .figure")).to_have_text(re.compile(r"\d"))
     expect(tile.locator(".line").nth(0)).to_have_text(re.compile(r"twin.*modelled.*\d"))
     expect(tile.locator(".line.rest")).to_have_text(re.compile(r"gap.*\d.*K"))
-    for view in ("gap", "alerts", "replay", "validation"):
+    for view in ("gap", "alerts", "replay", "parts"):
         visit.open(f"#/{view}" if view == "alerts" else f"#/{view}/vmc")
         page.wait_for_timeout(400)
     visit.open("#/machine/vmc")

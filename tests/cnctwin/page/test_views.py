@@ -10,7 +10,7 @@ from tests.cnctwin.page.documents import CHANGED, FAULTY, alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import SignalValue
 
-VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "validation/vmc", "jobs")
+VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "parts/vmc", "jobs")
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 NUMBER = re.compile(r"[−+]?\d")
 INK = """async (selector) => {
@@ -150,7 +150,8 @@ def test_the_gap_has_a_place_a_cause_and_a_next_step(visit: Visit) -> None:
 def test_an_alert_is_acknowledged_with_name_and_comment(visit: Visit, shop: Shop) -> None:
     page = visit.open("#/alerts")
     first = page.locator(".alarmcard.firing").first
-    expect(first).to_contain_text("Spindle overload")
+    expect(first.locator("h3")).to_have_text("vmc · Spindle load 131 % for 4 s, limit 120 %")
+    expect(first).to_contain_text("Check the tool for wear")
     first.get_by_role("button", name="Acknowledge").click()
     page.get_by_label("Your name").fill("ada")
     page.get_by_label("Comment").fill("on my way")
@@ -220,7 +221,7 @@ def test_what_is_recomputed_is_said_to_be_equal_or_not(visit: Visit, shop: Shop)
 
 
 def test_parts_and_validation_are_shown(visit: Visit) -> None:
-    page = visit.open("#/validation/vmc")
+    page = visit.open("#/parts/vmc")
     main = page.locator("main")
     for text in (
         "BASE-PLATE.NC",
@@ -250,7 +251,7 @@ def test_the_whole_page_can_be_gone_through_by_keyboard(visit: Visit) -> None:
     expect(page).to_have_url(re.compile("#/machine/vmc"))
     page.keyboard.press("3")
     expect(page.locator(".panel.own .name")).to_have_text("Spindle speed, rev/min")
-    for key, view in (("g", "gap"), ("a", "alerts"), ("r", "replay"), ("p", "validation"), ("j", "jobs"), ("f", "fleet")):
+    for key, view in (("g", "gap"), ("a", "alerts"), ("r", "replay"), ("p", "parts"), ("j", "jobs"), ("f", "fleet")):
         page.keyboard.press(key)
         expect(page.locator(f"body[data-view={view}]")).to_be_visible()
     page.keyboard.press("/")
@@ -296,7 +297,7 @@ def test_text_from_a_machine_stays_text(visit: Visit, shop: Shop) -> None:
         200,
         {"jobs": [job(HOSTILE, HOSTILE, HOSTILE, reason=HOSTILE, sentence=HOSTILE)]},
     )
-    for place in ("fleet", "machine/vmc", "alerts", "replay/vmc", "validation/vmc", "jobs", "gap/vmc"):
+    for place in ("fleet", "machine/vmc", "alerts", "replay/vmc", "parts/vmc", "jobs", "gap/vmc"):
         page = visit.open(f"#/{place}")
         expect(page.locator("main")).to_contain_text("<img src=x" if place != "gap/vmc" else "Standing")
         page.wait_for_timeout(150)
@@ -343,7 +344,7 @@ def test_without_a_machine_the_page_says_what_to_do(browser: Browser) -> None:
         visit = Visit(browser, server.url)
         page = visit.open("")
         expect(page.locator("main")).to_contain_text("cnctwin demo")
-        for place in ("machine", "gap", "replay", "validation"):
+        for place in ("machine", "gap", "replay", "parts"):
             expect(visit.open(f"#/{place}").locator("main")).to_contain_text("No machine yet")
         visit.context.close()
         assert visit.errors == []
@@ -354,3 +355,80 @@ def test_the_time_of_a_value_is_the_servers_not_the_tablets(visit: Visit) -> Non
     visit.page.add_init_script("const own = Date.now; Date.now = () => own() + 3600000;")
     page = visit.open("#/machine/vmc")
     expect(page.locator('[data-tile="spindle_load_pct"] .aged')).to_have_text(re.compile(r"now|^\d+ s|for \d+ s"))
+
+
+def test_a_machine_without_a_spindle_temperature_opens_on_what_it_has(visit: Visit, shop: Shop) -> None:
+    shop.without["vmc"] = re.compile("spindle_temp_c|twin/spindle_temp_residual_k")
+    shop.other["vmc"] = {"twin/spindle_temp_c": SignalValue(None, "°C", "modelled", "no ambient temperature")}
+    page = visit.open("#/machine/vmc")
+    expect(page.locator(".panel.own .name")).to_have_text("Spindle load, %")
+    expect(page.get_by_label("Signal to chart")).to_have_value("spindle_load_pct")
+    expect_drawn(page, ".panel.own canvas")
+    page.locator('[data-tile="spindle_temp_c"]').click()
+    expect(page.get_by_label("Signal to chart")).to_have_value("spindle_temp_c")
+    expect(page.locator(".panel.own .why")).to_contain_text("not offered by this machine")
+
+
+def test_a_control_that_tells_positions_only_opens_on_one_of_them(visit: Visit, shop: Shop) -> None:
+    shop.without["vmc"] = re.compile("(spindle|feed_mm|vibration|axis_._load|ambient|twin/(?!spindle_temp_c$)).*")
+    shop.other["vmc"] = {"axis_x_pos_mm": SignalValue(12.5, "mm")} | {
+        "twin/spindle_temp_c": SignalValue(None, "°C", "modelled", "speed is not known")
+    }
+    page = visit.open("#/machine/vmc")
+    expect(page.get_by_label("Signal to chart")).to_have_value("axis_x_pos_mm")
+    expect(page.locator(".panel.own .name")).to_have_text("X position, mm")
+
+
+def test_measured_twin_and_gap_are_of_one_moment(visit: Visit) -> None:
+    visit.open("#/machine/vmc")
+    shown = visit.evaluate("""
+      const [{ Machine }, { Tile }, { TILES }] = await Promise.all([module('plant'), module('views/tiles'), module('charted')]);
+      const machine = new Machine('lathe'), tile = new Tile(machine, TILES[0], () => {}), read = [];
+      machine.setOnline(true);
+      const now = Date.now();
+      const told = (ms, of) => {
+        for (const [signal, value, unit] of of) machine.know(signal, { value, t: now - 20000 + ms, unit }, { series: true });
+        tile.write();
+        read.push([...tile.element.querySelectorAll('.big .figure, .line:not([hidden]) .figure')].map((one) => one.textContent));
+        read.push(tile.rest.more.textContent.replace(/\\d+:\\d+:\\d+/, 'TIME'));
+      };
+      const own = (value) => ['spindle_temp_c', value, '°C'];
+      const twin = (value, rest) => [['twin/spindle_temp_c', value, '°C'], ['twin/spindle_temp_residual_k', rest, 'K']];
+      told(0, [own(40.04), ...twin(38.96, 1.08)]);
+      told(500, [own(43)]);
+      told(600, twin(39.5, 3.5));
+      told(9000, [own(50)]);
+      return read;
+    """)
+    assert shown == [
+        ["40.0", "39.0", "+1.0 K"], "",  # the difference of the figures that are shown
+        ["40.0", "39.0", "+1.0 K"], "",  # the twin has not spoken of the new one yet
+        ["43.0", "39.5", "+3.5 K"], "",
+        ["50.0", "39.5", "+3.5 K"], "(at TIME: the twin is behind)",
+    ]  # fmt: skip
+
+
+def test_figures_are_written_in_the_readers_language(browser: Browser, server: FakeServer) -> None:
+    visit = Visit(browser, server.url, locale="de-DE")
+    page = visit.open("#/machine/vmc")
+    expect(page.locator('[data-tile="spindle_temp_c"] .big .figure')).to_have_text(re.compile(r"^\d+,\d$"))
+    shown = visit.evaluate(
+        "const { number, coarse } = await module('text'); return [number(8500.4, 'rpm'), number(-1.5), coarse(2.34)]"
+    )
+    visit.context.close()
+    assert shown == ["8500", "−1,5", "2,3"]
+
+
+def test_the_address_of_the_parts_is_their_name_and_the_old_one_still_leads_there(visit: Visit) -> None:
+    for place in ("#/parts/vmc", "#/validation/vmc"):
+        page = visit.open(place)
+        expect(page.get_by_role("link", name="Parts")).to_have_attribute("aria-current", "page")
+    page = visit.open("#/parts")
+    expect(page.get_by_role("link", name="Parts")).to_have_attribute("aria-current", "page")
+
+
+def test_a_gap_that_is_not_known_says_so_and_one_that_is_says_in_what(visit: Visit, shop: Shop) -> None:
+    page = visit.open("#/fleet")
+    gap = page.locator("a.unit", has=page.get_by_text("vmc", exact=True)).locator(".cell.gaps")
+    expect(gap).to_have_text(re.compile(r"3.1× noise"))
+    expect(gap.locator(".figure")).to_have_attribute("title", re.compile("multiple of its noise"))

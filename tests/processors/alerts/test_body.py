@@ -1,5 +1,6 @@
 """What a notification says, in Alertmanager's words."""
 
+from processors.alerts.words.language import language
 from tests.processors.alerts.courier.alert_shop import VIBRATION, Shop
 
 
@@ -24,10 +25,10 @@ def test_the_body_is_that_of_alertmanagers_webhook_version_4() -> None:
     assert alert == {
         "status": "firing",
         "labels": labels,
-        "annotations": {"summary": "rule_vibration on okuma"},
+        "annotations": {"summary": "okuma: Vibration too high", "advice": language("en").alerts["rule_vibration"].advice},
         "startsAt": "2026-11-18T11:06:40.000Z",
         "endsAt": "0001-01-01T00:00:00Z",
-        "generatorURL": "https://twin.plant.example",
+        "generatorURL": "https://twin.plant.example/#/replay/okuma?from=1794999700000&to=1795000300000&at=1795000000000",
         "fingerprint": shop.fingerprint(),
     }
 

@@ -35,9 +35,9 @@ def test_twelve_processors_that_are_behind_are_one_notification_that_names_them_
     behind(shop, 31, 18.2, "thermal", "mirror")
     assert shop.alert(NAME, PLANT)["phase"] == "firing"
     (told,) = shop.told
-    assert told.title == "[1 firing, medium] plant: processors_behind"
+    assert told.title == "plant: Processors are behind for 39 s"
     sentence = "processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes"
-    assert f"{sentence} (mirror, thermal)" in told.text
+    assert told.text.startswith(f"P{sentence[1:]} (mirror, thermal)\n")
     assert shop.metrics["okuma", "twin/alert_state"] == "none"
     behind(shop, 600, 30.0, "thermal", "mirror")
     assert len(shop.told) == 1
@@ -47,7 +47,7 @@ def test_what_it_says_is_as_of_the_moment_when_it_fired() -> None:
     shop = Shop()
     for second in range(60):
         behind(shop, 1, 5.0 + second)
-    assert "processors are 35 s behind" in shop.told[0].text
+    assert "Processors are 35 s behind" in shop.told[0].text
 
 
 def test_it_is_over_when_all_have_caught_up_for_a_minute_and_that_is_one_notification_too() -> None:

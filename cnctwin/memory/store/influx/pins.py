@@ -6,12 +6,13 @@ is copied by `copy`, a slice at a time, as soon as the ring has handed over all 
 
 from collections.abc import Callable, Iterable
 
-from cnctwin.memory.store.contract import DERIVED, RAW, Pinned
+from cnctwin.memory.store.contract import DERIVED, RAW, Pinned, merged
 from cnctwin.memory.store.influx.address import PINNED
 from cnctwin.memory.store.influx.line_protocol import fields, influx_line, tags
 from cnctwin.memory.store.influx.sample_row import SampleRow
 from cnctwin.memory.store.influx.spool import Batch, PinnedCopy, Spool
 
+PINS = "SELECT machine, from_ms, to_ms, reason FROM pins WHERE ?1 IS NULL OR machine = ?1"
 SLICE_MS = 60_000
 SLICES_AT_ONCE = 30
 Samples = Callable[[str, str, int, int], list[SampleRow]]
@@ -27,11 +28,8 @@ class Pins:
             self._stretches.setdefault(pinned.machine, []).append((pinned.from_ms, pinned.to_ms))
 
     def all(self, machine: str | None = None) -> list[Pinned]:
-        """All pins, oldest first."""
-        asked = (
-            "SELECT machine, from_ms, to_ms, reason FROM pins WHERE ?1 IS NULL OR machine = ?1 ORDER BY from_ms, machine, to_ms"
-        )
-        return [Pinned(*row) for row in self._spool.ask(asked, (machine,))]
+        """Return all pins, oldest first; those of a machine that overlap are one, with all their reasons."""
+        return merged(Pinned(*row) for row in self._spool.ask(PINS, (machine,)))
 
     def add(self, pinned: Pinned) -> None:
         """Keep a stretch; twice the same is once."""

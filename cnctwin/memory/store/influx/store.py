@@ -24,10 +24,11 @@ from cnctwin.memory.store.contract import (
     Status,
     StoreError,
     Tidied,
+    merged,
 )
 from cnctwin.memory.store.influx.columns import Answered, columns
 from cnctwin.memory.store.influx.intake import Intake
-from cnctwin.memory.store.influx.pins import Pins
+from cnctwin.memory.store.influx.pins import PINS, Pins
 from cnctwin.memory.store.influx.sample_row import SampleRow
 from cnctwin.memory.store.influx.sender import Patience, Sender
 from cnctwin.memory.store.influx.server import Server
@@ -90,11 +91,8 @@ class ReadOnlyServer:
         return None
 
     def pins(self, machine: str | None = None) -> list[Pinned]:
-        """The pins that the writer on this machine has set, oldest first; none where it runs elsewhere."""
-        asked = (
-            "SELECT machine, from_ms, to_ms, reason FROM pins WHERE ?1 IS NULL OR machine = ?1 ORDER BY from_ms, machine, to_ms"
-        )
-        return [Pinned(*row) for row in self._ring(asked, (machine,))]
+        """Return the pins that the writer on this machine has set, as `merged` has them; none where it runs elsewhere."""
+        return merged(Pinned(*row) for row in self._ring(PINS, (machine,)))
 
     def oldest_waiting_ms(self) -> int | None:
         """The time of the oldest sample that waits for the server; None where none does."""
@@ -189,7 +187,7 @@ class ServerStore(ReadOnlyServer):
         self._pins.add(pinned)
 
     def pins(self, machine: str | None = None) -> list[Pinned]:
-        """All pins, oldest first."""
+        """Return all pins, oldest first; those of a machine that overlap are one, with all their reasons."""
         return self._pins.all(machine)
 
     def keep_snapshot(self, *snapshots: Snapshot) -> None:

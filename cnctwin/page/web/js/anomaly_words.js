@@ -1,7 +1,7 @@
 // Why a score alarms, in words, from the JSON of twin/anomaly_why; and what a person's verdict has brought about.
 
 import { lookup } from "./lookup.js";
-import { moment, number, title } from "./text.js";
+import { fixed, moment, number, title } from "./text.js";
 
 const OVER = lookup({ seconds: "within seconds", cut: "over some cuts", part: "over minutes", tool: "against the last parts of this tool" });
 const VERDICTS = lookup({ true: "True", false: "False", known: "Known" });
@@ -65,7 +65,7 @@ export function likes(why) {
   const known = list(why.like).filter((one) => one && text(one.label) && isNumber(one.likeness));
   if (!known.length) return "It looks like no alarm that has a name.";
   return `Looks like: ${known
-    .map((one) => `${one.label} (${one.likeness.toFixed(2)}, ${moment(one.at_s * 1000, { seconds: false })})`)
+    .map((one) => `${one.label} (${fixed(one.likeness, 2)}, ${moment(one.at_s * 1000, { seconds: false })})`)
     .join("; ")}.`;
 }
 

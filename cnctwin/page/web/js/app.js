@@ -16,19 +16,22 @@ import * as fleet from "./views/fleet.js";
 import * as gap from "./views/gap.js";
 import * as jobs from "./views/jobs.js";
 import * as machine from "./views/machine.js";
+import * as parts from "./views/parts.js";
 import * as replay from "./views/replay.js";
-import * as validation from "./views/validation.js";
 
-const VIEWS = lookup({ fleet, machine, gap, alerts, replay, validation, jobs });
+
+const VIEWS = lookup({ fleet, machine, gap, alerts, replay, parts, jobs });
+const RENAMED = lookup({ validation: "parts" }); // addresses that people have kept
 const TABS = [
   ["fleet", "Fleet", "f"],
   ["machine", "Machine", "m"],
   ["gap", "Gap", "g"],
   ["alerts", "Alerts", "a"],
   ["replay", "Replay", "r"],
-  ["validation", "Parts", "p"],
+  ["parts", "Parts", "p"],
   ["jobs", "Jobs", "j"],
 ];
+const PER_MACHINE = ["machine", "gap", "replay", "parts"];
 const ALERTS_MS = 5000;
 
 const main = document.getElementById("main"),
@@ -64,7 +67,8 @@ function place() {
   } catch {
     /* a broken address is no machine */
   }
-  return { name: name in VIEWS ? name : "fleet", machine: machineName || null, search: new URLSearchParams(search ?? "") };
+  const view = RENAMED[name] ?? name;
+  return { name: view in VIEWS ? view : "fleet", machine: machineName || null, search: new URLSearchParams(search ?? "") };
 }
 
 export const address = (name, machineName, search) =>
@@ -118,7 +122,7 @@ function tabs() {
     }
   }
   for (const [name, link] of tabLinks) {
-    if (["machine", "gap", "replay", "validation"].includes(name)) link.setAttribute("href", address(name, app.pick(null)));
+    if (PER_MACHINE.includes(name)) link.setAttribute("href", address(name, app.pick(null)));
     if (name === app.view?.name) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
@@ -280,7 +284,7 @@ export const EVERYWHERE = [
   ...TABS.map(([name, text, key]) => [
     [key],
     text,
-    () => app.go(address(name, ["machine", "gap", "replay", "validation"].includes(name) ? app.pick(null) : null)),
+    () => app.go(address(name, PER_MACHINE.includes(name) ? app.pick(null) : null)),
   ]),
   [["[", "]"], "previous, next machine", (key) => neighbour(key === "[" ? -1 : 1)],
   [["?"], "this list", () => openHelp(app, EVERYWHERE)],

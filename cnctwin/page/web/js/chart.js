@@ -2,6 +2,8 @@
 // steps; where a value is unknown the line ends. Behind the lines: tool changes (gates) shaded, stale stretches hatched. Over them:
 // tools, the threshold, and the moment that is looked at.
 
+import { digits } from "./text.js";
+
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const themes = new Set();
 let theme = null;
@@ -144,7 +146,7 @@ export class Chart {
           size: 56,
           gap: 6,
           space: this.height < 100 ? 17 : 26,
-          values: (_, splits) => splits.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")),
+          values: (_, splits) => splits.map((v) => digits(v, 6)),
         },
       ],
       series: [

@@ -117,6 +117,15 @@ export function difference(a, b) {
   return [t, v];
 }
 
+/** The value of a signal that held at t; null where none is known. */
+export function valueAt(machine, signal, t) {
+  const series = machine.series.get(signal);
+  if (series instanceof Steps) return series.at(t) ?? null;
+  if (!(series instanceof Ring)) return null;
+  const i = series.indexAt(t + 1) - 1;
+  return i < 0 || Number.isNaN(series.valueAt(i)) ? null : series.valueAt(i);
+}
+
 export function stretches(machine, signal, from, to) {
   const series = machine.series.get(signal);
   return series instanceof Steps ? series.stretches(from, to) : [];

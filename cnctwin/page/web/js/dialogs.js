@@ -5,7 +5,7 @@ import { clockOffset } from "./clock.js";
 import { el, symbol, table } from "./dom.js";
 import { lag } from "./lag.js";
 import { may, me } from "./me.js";
-import { age, execution, moment, words } from "./text.js";
+import { age, execution, fixed, moment, words } from "./text.js";
 
 const dialog = () => document.getElementById("dialog");
 
@@ -104,7 +104,7 @@ export function openLink(app) {
       [
         "Clock",
         Math.abs(clockOffset()) > 50
-          ? `this device is ${(clockOffset() / 1000).toFixed(1)} s ${clockOffset() > 0 ? "behind" : "ahead of"} the server`
+          ? `this device is ${fixed(Math.abs(clockOffset()) / 1000, 1)} s ${clockOffset() > 0 ? "behind" : "ahead of"} the server`
           : "agrees with the server's",
       ],
     ];

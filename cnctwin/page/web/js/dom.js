@@ -68,9 +68,13 @@ export function setTitle(element, text) {
 }
 
 /** A table that scrolls in itself: its first column names the row. cells: texts or elements; numbers: columns set to the right. */
+/** The head of a column. One without a word is no head: a screen reader would read it as an empty one. */
+export const columnHead = (text, isNumber = false) =>
+  el(text ? "th" : "td", { scope: text ? "col" : null, class: isNumber ? "number" : null }, text);
+
 export function table(heads, rows, { numbers = [], label = "", className = "" } = {}) {
   const side = (i) => (numbers.includes(i) ? "number" : null);
-  const head = heads.map((text, i) => el("th", { scope: "col", class: side(i) }, text));
+  const head = heads.map((text, i) => columnHead(text, numbers.includes(i)));
   const body = rows.map((cells) =>
     el(
       "tr",

@@ -130,6 +130,29 @@ export function execution(state) {
 
 const MINUS = (text) => text.replace("-", "−");
 
+// Figures have the decimal sign of the reader's language, and no sign between thousands: 1.234 is one number to one reader and
+// a thousand times as much to another.
+const formats = new Map();
+function written(value, least, most, digits) {
+  const key = digits ?? `${least}-${most}`;
+  if (!formats.has(key))
+    formats.set(
+      key,
+      new Intl.NumberFormat(navigator.language, {
+        useGrouping: false,
+        signDisplay: "negative",
+        ...(digits ? { maximumSignificantDigits: digits } : { minimumFractionDigits: least, maximumFractionDigits: most }),
+      }),
+    );
+  return MINUS(formats.get(key).format(value));
+}
+
+/** A number with so many decimal places. */
+export const fixed = (value, places) => written(value, places, places);
+
+/** A number with so many digits that count, and no zeros behind them. */
+export const digits = (value, count) => written(value, null, null, count);
+
 function decimals(unit, size) {
   if (["°C", "K", "celsius", "%", "degC"].includes(unit)) return 1;
   if (["rev/min", "rpm", "N", "mm/min"].includes(unit)) return 0;
@@ -143,9 +166,18 @@ export function number(value, unit = null) {
   if (value === 0) return "0";
   const size = Math.abs(value),
     places = decimals(unit, size);
-  if (places !== null) return MINUS(value.toFixed(places)).replace(/^−(0(?:\.0+)?)$/, "$1");
-  if (size >= 1e6 || size < 1e-4) return MINUS(value.toExponential(2));
-  return MINUS(String(Number(value.toPrecision(size >= 1000 ? 5 : 4))));
+  if (places !== null) return fixed(value, places);
+  if (size >= 1e6 || size < 1e-4) {
+    const [factor, power] = value.toExponential(2).split("e");
+    return `${fixed(Number(factor), 2)}e${MINUS(power)}`;
+  }
+  return digits(value, size >= 1000 ? 5 : 4);
+}
+
+/** A number as `number` shows it where its unit has fixed places, so that a difference of two can be checked by eye. */
+export function rounded(value, unit = null) {
+  const places = decimals(unit, Math.abs(value));
+  return places === null ? value : Number(value.toFixed(places));
 }
 
 /** Any value without its unit. */
@@ -162,7 +194,7 @@ export const signed = (value, unit = null) =>
 
 /** Two digits that count: of a gap in floors more would be noise. */
 export const coarse = (value) =>
-  !Number.isFinite(value) ? "–" : Math.abs(value) >= 10 ? MINUS(value.toFixed(0)) : MINUS(String(Number(value.toPrecision(2))));
+  !Number.isFinite(value) ? "–" : Math.abs(value) >= 10 ? fixed(value, 0) : digits(value, 2);
 
 /** An age in words, from a number of ms. */
 export function age(ms) {
@@ -178,7 +210,7 @@ export function age(ms) {
 /** A stretch of time from a number of ms. */
 export function duration(ms) {
   const s = ms / 1000;
-  if (s < 60) return `${Number(s.toPrecision(3))} s`;
+  if (s < 60) return `${digits(s, 3)} s`;
   if (s < 3600) return `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`;
   return `${Math.floor(s / 3600)} h ${String(Math.floor((s % 3600) / 60)).padStart(2, "0")} min`;
 }

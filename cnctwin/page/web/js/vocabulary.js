@@ -65,6 +65,7 @@ export const RULE_VIBRATION = "twin/rule_vibration";
 export const RULE_TOOL_BROKEN = "twin/rule_tool_broken";
 export const RULE_LOAD_OVER_EXPECTED = "twin/rule_load_over_expected";
 export const RULE_DETAIL = "twin/rule_detail";
+export const RULE_FINDINGS = "twin/rule_findings";
 export const SEVERITY = "twin/severity";
 export const STOP_REASON = "twin/stop_reason";
 export const PART_RECORD = "twin/part_record";

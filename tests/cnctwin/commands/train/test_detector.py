@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,13 @@ from rich.console import Console
 from benchmarks import synthetic_changes as drive
 from cnctwin.errors import UsageError
 from cnctwin.training.detector.recorded_streams import known_changes, streams_of
-from cnctwin.training.detector.train import train_detector
+from cnctwin.training.detector.train import sentences_of, train_detector
 from twin.runlog import run_log, write_run
 from twin.transient.artefact import load_detector
 from twin.transient.replay import replayed
 from twin.transient.stream import Stream
 from twin.transient.training import TrainingSettings
+from twin.transient.training import trained as detector_of
 
 ASKED = TrainingSettings("spindle_load_pct", before_s=9.0, after_s=9.0)
 
@@ -60,6 +62,13 @@ def test_labelled_history_gives_a_detector_that_finds_changes_in_another_run(run
     assert all(any(abs((one.begun_s + one.at_s) / 2 - at) < 5.0 for one in confirmed) for at in other.changes_s)
 
 
+def test_what_opening_early_costs_is_said_in_times_and_minutes_a_day(tmp_path: Path) -> None:
+    done = detector_of([recorded(tmp_path / "run.csv", 1, labelled=True)], ASKED, np.random.default_rng(0))
+    assert "in these runs it never takes anything else for the beginning of a tool change" in sentences_of(done, ASKED)
+    said = " ".join(sentences_of(replace(done, provisional_per_day=325.9, provisional_s_per_day=2445.0), ASKED))
+    assert "about 326 times a day" in said and "held back for 41 min a day (2.8 %)" in said
+
+
 def test_one_time_given_by_a_person_is_enough(tmp_path: Path) -> None:
     stream = recorded(tmp_path / "run.csv", 3, labelled=False)
     trained([tmp_path / "run.csv"], tmp_path / "model", at=(stream.changes_s[1],))
@@ -78,6 +87,7 @@ def test_the_same_runs_give_the_same_bytes(run: Path, tmp_path: Path) -> None:
 def test_json_holds_every_figure(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trained([run], tmp_path / "model", as_json=True)
     figures = json.loads(capsys.readouterr().out)
+    assert figures["provisional_per_day"] == figures["provisional_s_per_day"] == 0.0
     assert figures["changes"] == figures["confirmed"] == 5
     assert set(figures["false_gates"]) >= {"per_day", "low", "high", "null_hours", "is_extrapolated"}
     assert figures["out"] == str(tmp_path / "model")

@@ -3,10 +3,12 @@
 import json
 import logging
 import os
+import quopri
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from pydantic import TypeAdapter
@@ -264,6 +266,47 @@ def test_apprise_is_sent_to_whatever_its_address_names(server: ReceivingServer) 
     assert server.received[0].json["type"] == "failure"
     server.usual = Answer(500)
     assert apprise.send(message()).verdict is Verdict.UNSURE
+
+
+LINK = "https://twin.plant.example/#/replay/okuma?from=1&to=2&at=3"
+
+
+def test_pushover_is_sent_the_link_in_the_field_that_it_has_for_it(server: ReceivingServer) -> None:
+    server.usual = QUEUED
+    service(server, "pushover").send(message("medium", link=LINK, link_title="See that moment"))
+    service(server, "pushover").send(message("medium", link="https://twin.plant.example/" + "x" * 500))
+    first, second = (one.form for one in server.received)
+    assert (first["url"], first["url_title"]) == (LINK, "See that moment")
+    assert "url" not in second, "Pushover refuses a message whose address is longer than 512 characters"
+
+
+@pytest.mark.parametrize(
+    ("address", "shown"),
+    [
+        ("slack://T1JJ3T3L2/A1BRTD4JD/TIiajkdnlazkcOXrIdevi7FQ/#general", "Part_7 (2)\\nSee that moment: https://twin.plant"),
+        ("workflows://h/workflow1a/signature1/", f"Part\\\\_7 \\\\(2\\\\)\\n\\n[See that moment]({LINK})"),
+        ("mailto://user:pass@example.com?to=x@example.com", "Part_7 (2)\nSee that moment: https://twin.plant"),
+    ],
+)
+def test_what_slack_teams_and_mail_are_sent_by_apprise(address: str, shown: str) -> None:
+    """As the libraries that it sends with are given it; the first line is what the service shows as a title."""
+    pytest.importorskip("apprise")
+    ours = service_of("x", RECEIVER.validate_python({"type": "apprise", "url": "$URL"}), {"URL": address})
+    told = message("high", text="Part_7 (2)", link=LINK, link_title="See that moment")
+    with (
+        patch("requests.request") as request,
+        patch("requests.post") as post,
+        patch("smtplib.SMTP") as mail,
+        patch("smtplib.SMTP_SSL") as mails,
+    ):
+        for calls in (request, post):
+            calls.return_value.status_code, calls.return_value.content = 200, b"ok"
+        ours.send(told)
+    sent = [*(call.kwargs["data"] for one in (request, post) for call in one.call_args_list)]
+    sent += [call.args[2] for one in (mail, mails) for call in one.return_value.sendmail.call_args_list]
+    assert len(sent) == 1
+    assert "okuma: Vibration too high for 10 s" in sent[0]
+    assert shown in quopri.decodestring(sent[0]).decode() if address.startswith("mailto") else shown in sent[0]
 
 
 def test_an_address_that_apprise_does_not_know_is_said_before_anything_starts() -> None:

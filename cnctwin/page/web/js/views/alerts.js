@@ -18,6 +18,14 @@ const RESOLVED_MAX = 20;
 const ANOMALY = "anomaly_alarm";
 const PANELS_MAX = 20;
 
+/** The sentence of an alert without the machine before it; the alert's name where there is none. */
+function sentence({ labels = {}, annotations = {} }) {
+  const told = annotations.summary ?? "",
+    before = `${labels.machine ?? ""}: `;
+  if (told) return told.startsWith(before) ? told.slice(before.length) : told;
+  return words((labels.alertname ?? "alert").replace(/^rule_/, "").replace(/^twin\//, ""));
+}
+
 const began = (alert) => Date.parse(alert.startsAt);
 const ended = (alert) => {
   const at = Date.parse(alert.endsAt);
@@ -68,7 +76,7 @@ export function open(app) {
       "p",
       {},
       el("strong", {}, alert.labels?.machine ?? ""),
-      `: ${alert.annotations?.summary ?? ""}. It is not repeated and goes to nobody else. An alert that becomes more severe fires again.`,
+      `: ${sentence(alert)}. It is not repeated and goes to nobody else. An alert that becomes more severe fires again.`,
     );
     openSigned("Acknowledge", about, "Acknowledge", async (by, comment) => {
       const outcome = await post(`alerts/${part(alert.fingerprint)}/acknowledge`, { by, comment, episode: alert.episode });
@@ -97,7 +105,6 @@ export function open(app) {
       machine = labels.machine ?? "",
       start = began(alert),
       end = ended(alert);
-    const name = words((labels.alertname ?? "alert").replace(/^rule_/, "").replace(/^twin\//, ""));
     const facts = [
       el("span", {}, el("span", { class: "severity" }, alert.severity ?? ""), ` · ${alert.phase}`),
       el("span", {}, `since ${moment(start)} (${age((end ?? serverNow()) - start)})`),
@@ -124,8 +131,9 @@ export function open(app) {
       el(
         "div",
         {},
-        el("h3", {}, el("a", { href: app.address("machine", machine) }, machine), ` · ${name}`),
+        el("h3", {}, el("a", { href: app.address("machine", machine) }, machine), ` · ${sentence(alert)}`),
         annotations.description ? el("p", { class: "what" }, annotations.description) : null,
+        annotations.advice && !end ? el("p", { class: "advice" }, annotations.advice) : null,
         el("p", { class: "facts" }, facts),
       ),
       el(

@@ -1,6 +1,6 @@
 // The parts of a machine that a diagnosis compared alone, the constants that moved, and what is described but has no name.
 
-import { el } from "../dom.js";
+import { columnHead, el } from "../dom.js";
 import { lookup } from "../lookup.js";
 import { number, recorded, sentence, share, words } from "../text.js";
 import { shade } from "./gap_shade.js";
@@ -21,7 +21,7 @@ export function partsSections(diagnosis) {
 }
 
 function table(label, name, titles, rows) {
-  const head = titles.map(([title, isNumber]) => el("th", { scope: "col", class: isNumber ? "number" : null }, title));
+  const head = titles.map(([title, isNumber]) => columnHead(title, isNumber));
   return el(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": label },

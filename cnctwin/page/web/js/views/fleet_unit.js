@@ -3,7 +3,7 @@
 import { sparkline } from "../chart.js";
 import { el, setClass, setData, setHidden, setSymbol, setText, setTitle, symbol } from "../dom.js";
 import { Ring, Steps } from "../ring.js";
-import { coarse, execution, moment, number, plain, signed } from "../text.js";
+import { coarse, execution, fixed, moment, number, plain, signed } from "../text.js";
 import {
   ADJUSTED_SCORE,
   ALERT_STATE,
@@ -47,7 +47,7 @@ export class Unit {
     this.scoreBar = part("fill");
     this.scoreMark = part("mark");
     this.gap = part("figure");
-    this.gapUnit = part("unitname", "floors");
+    this.gapUnit = part("unitname");
     this.growing = symbol("s-grow", "grow");
     this.alertSign = symbol("s-alert");
     this.alertWord = part("said");
@@ -100,7 +100,7 @@ export class Unit {
     setClass(this.loadBar, "over", load !== null && load > 100);
     this.figure(this.speed, "spindle_rpm", "rev/min");
     const score = this.figure(this.score, ADJUSTED_SCORE);
-    if (score !== null) setText(this.score, score.toFixed(2).replace("-", "−"));
+    if (score !== null) setText(this.score, fixed(score, 2));
     const limit = m.bare(ANOMALY_THRESHOLD),
       top = typeof limit === "number" && limit > 0 ? 2 * limit : 1;
     this.scale(this.scoreBar, score === null ? 0 : Math.max(0, score) / top);
@@ -111,14 +111,14 @@ export class Unit {
     const rest = gap === null ? m.bare(SPINDLE_TEMP_RESIDUAL_K) : null,
       hasRest = typeof rest === "number";
     setText(this.gap, gap !== null ? coarse(gap) : hasRest ? signed(rest, "K") : "–");
-    setText(this.gapUnit, gap !== null || !hasRest ? "floors" : "K now");
+    setText(this.gapUnit, gap !== null ? "× noise" : hasRest ? "K now" : "");
     setTitle(
       this.gap,
       gap !== null
-        ? "the largest standing gap of a signal, in floors"
+        ? "the largest gap between machine and twin that stays, as a multiple of its noise: of what the same signal differs by from part to part. Below 3 it is hardly more than noise."
         : hasRest
           ? "spindle temperature, measured minus twin, at this moment; the standing gap is not known yet"
-          : "",
+          : "not known yet: the twin has not seen enough of this machine",
     );
     setClass(this.gap, "large", gap !== null && gap > 3);
     setClass(this.growing, "off", !growing);

@@ -115,7 +115,7 @@ class Card {
       "article",
       { class: "jobcard", "data-job": job.id },
       this.sign,
-      el("div", {}, el("h3", {}, title), this.caution, this.what, this.bar, this.facts, this.details),
+      el("div", {}, el("h2", {}, title), this.caution, this.what, this.bar, this.facts, this.details),
       el("div", { class: "acts" }, this.button),
     );
   }

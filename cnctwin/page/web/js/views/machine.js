@@ -23,6 +23,17 @@ const WINDOWS = [
   [900000, "15 min"],
 ];
 
+/** The signal that a machine opens on: the first tile that has a figure of its own, else another measured one, else the twin's. */
+function opened(machine, measured, twin) {
+  const has = (signal) => typeof machine.bare(signal) === "number" || machine.series.has(signal);
+  const tile = TILES.find((one) => has(tileOf(machine, one)?.own));
+  const first = (names) => names.find((signal) => has(signal) && !isPlace(signal)) ?? names.find(has);
+  return tile?.id ?? first(measured) ?? first(twin) ?? measured[0] ?? twin[0] ?? null;
+}
+
+/** Positions and overrides say little over time; they are charted last. */
+const isPlace = (signal) => /_pos_(mm|deg)$|_override_pct$|^clock_/.test(signal);
+
 export function open(app, { machine: named, search }) {
   const name = app.pick(named);
   if (name === null) return noMachine(app, "Machine", "A machine appears as soon as its edge says that it is there.");
@@ -89,7 +100,11 @@ export function open(app, { machine: named, search }) {
   function choose(id) {
     panels.choose(chartOf(machine, id));
     for (const tile of tiles) tile.press?.(tile.tile?.id === id || tile.shown?.own === id);
-    if (select.value !== panels.charted.own) select.value = panels.charted.own;
+    select.value = panels.charted.own;
+    if (select.selectedIndex < 0) {
+      select.append(el("option", { value: panels.charted.own }, title(panels.charted.own))); // charted, and without a figure
+      select.value = panels.charted.own;
+    }
     fill();
     draw(); // at once, so that nothing is empty for a moment
   }
@@ -156,7 +171,7 @@ export function open(app, { machine: named, search }) {
           )
         : null;
     select.replaceChildren(...[group("Measured", measured), group("Twin", twin)].filter(Boolean));
-    const shown = asked ?? TILES.find((tile) => tileOf(machine, tile))?.id ?? measured[0] ?? twin[0] ?? null;
+    const shown = asked ?? opened(machine, measured, twin);
     if (shown !== null) choose(shown);
   }
 

@@ -1,19 +1,9 @@
 // A moment of the past: state, program, tool, gate, figures, and the description that was live.
 
-import { SCORES } from "../charted.js";
+import { SCORES, valueAt } from "../charted.js";
 import { el, setText } from "../dom.js";
-import { Ring, Steps } from "../ring.js";
 import { execution, number, plain } from "../text.js";
 import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
-
-/** The value of a signal that held at t. */
-function valueAt(past, signal, t) {
-  const series = past.series.get(signal);
-  if (series instanceof Steps) return series.at(t) ?? null;
-  if (!(series instanceof Ring)) return null;
-  const i = series.indexAt(t + 1) - 1;
-  return i < 0 || Number.isNaN(series.valueAt(i)) ? null : series.valueAt(i);
-}
 
 export class MomentShown {
   constructor() {

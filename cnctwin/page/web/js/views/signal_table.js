@@ -1,6 +1,6 @@
 // Every signal of a machine: its value, where it comes from, how old it is, and why it is null. Written once a second while it is open.
 
-import { el, setClass, setText } from "../dom.js";
+import { columnHead, el, setClass, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
 import { age, moment, plain } from "../text.js";
 import { TWIN_PREFIX } from "../vocabulary.js";
@@ -30,7 +30,7 @@ export class SignalTable {
             el(
               "tr",
               {},
-              heads.map((text, i) => el("th", { scope: "col", class: i === 1 ? "number" : null }, text)),
+              heads.map((text, i) => columnHead(text, i === 1)),
             ),
           ),
           this.body,

@@ -1,6 +1,6 @@
 // The tools of a machine: how far each is worn, how many parts are left of it with their band, and why a figure is missing.
 
-import { el, setHidden, setText } from "../dom.js";
+import { columnHead, el, setHidden, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
 import { coarse } from "../text.js";
 import { MACHINE_DRIFT, MACHINE_DRIFT_BASIS, TOOL_LIVES } from "../vocabulary.js";
@@ -45,7 +45,7 @@ export class ToolLives {
             el(
               "tr",
               {},
-              HEADS.map((text, i) => el("th", { scope: "col", class: i < NUMBERS ? "number" : null }, text)),
+              HEADS.map((text, i) => columnHead(text, i < NUMBERS)),
             ),
           ),
           this.body,

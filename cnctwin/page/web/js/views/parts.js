@@ -3,7 +3,7 @@
 import { get, part } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openDocument } from "../dialogs.js";
-import { el, symbol } from "../dom.js";
+import { columnHead, el, symbol } from "../dom.js";
 import { lookup } from "../lookup.js";
 import { age, coarse, duration, moment, number, plain, words } from "../text.js";
 import { machineHead } from "./machine_head.js";
@@ -73,7 +73,7 @@ function figures(found) {
             "tr",
             {},
             ["Quantity", "Measure", "Value", "95 % interval", "Budget", ""].map((text, i) =>
-              el("th", { scope: "col", class: i > 1 && i < 5 ? "number" : null }, text),
+              columnHead(text, i > 1 && i < 5),
             ),
           ),
         ),
@@ -159,8 +159,8 @@ function parts(found) {
         el(
           "tr",
           {},
-          ["Made", "Program", "Part", "Cycle", "Tools", "Hottest", "Force, largest", "Gap, floors", "How it ended", ""].map(
-            (text, i) => el("th", { scope: "col", class: [2, 3, 5, 6, 7].includes(i) ? "number" : null }, text),
+          ["Made", "Program", "Part", "Cycle", "Tools", "Hottest", "Force, largest", "Gap, × noise", "How it ended", ""].map(
+            (text, i) => columnHead(text, [2, 3, 5, 6, 7].includes(i)),
           ),
         ),
       ),
@@ -175,7 +175,7 @@ export function open(app, { machine: named }) {
     return noMachine(app, "Parts and validation", "Parts are made by a machine, and its twin is validated; there is none so far.");
   const element = el("div", { class: "view validation-view" }),
     stop = new AbortController(),
-    head = machineHead(app, app.plant.machine(name), "validation");
+    head = machineHead(app, app.plant.machine(name), "parts");
   const made = el("div", {}, el("p", { class: "waiting" }, "Loading …")),
     proof = el("div", {}, el("p", { class: "waiting" }, "Loading …"));
   element.append(
