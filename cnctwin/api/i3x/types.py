@@ -4,15 +4,13 @@ A signal's type is that of its name: in the vocabulary, or in the declaration of
 neither knows is a `SparkplugMetric`: a scalar of whatever kind its device says.
 """
 
-import logging
 from collections.abc import Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
 from cnctwin.api.fleet import SHOWN
 from cnctwin.api.value_object import Plain
-from processors.contract import PYTHON_TYPES, OutputSpec
-from processors.discovery import find, modules
+from processors.outputs import declared_outputs, kind_of
 from twin.vocabulary.signals import AXES, SIGNALS, Kind, canonical
 from twin.vocabulary.twin_signals import live_name
 
@@ -27,8 +25,6 @@ NAMESPACES = (
 VERSION = "1.0.0"
 PLANT, MACHINE, METRIC = "type/Plant", "type/Machine", "type/SparkplugMetric"
 _OF_KIND = {Kind.NUMBER: "number", Kind.INTEGER: "integer", Kind.TEXT: "string", Kind.FLAG: "boolean"}
-_OF_PYTHON = {bool: "boolean", int: "integer", float: "number", str: "string"}
-_log = logging.getLogger(__name__)
 
 
 class ObjectType(NamedTuple):
@@ -116,23 +112,13 @@ def _signal_types() -> Iterator[ObjectType]:
         yield _signal_type(signal.name, _OF_KIND[signal.kind], signal.unit, signal.meaning)
     for pattern, signal in AXES:
         yield _signal_type(_axis_name(pattern.pattern), _OF_KIND[signal.kind], signal.unit, signal.meaning)
-    for output in _outputs():
-        yield _signal_type(output.name, _OF_PYTHON[PYTHON_TYPES[output.datatype][0]], output.unit or "", output.meaning)
+    for output in declared_outputs().values():
+        yield _signal_type(output.name, _OF_KIND[kind_of(output)], output.unit or "", output.meaning)
 
 
 def _signal_type(name: str, kind: str, unit: str, meaning: str) -> ObjectType:
     schema = {"type": kind, "description": meaning} | ({"unit": unit} if unit else {})
     return ObjectType(f"type/{name}", name.replace("_", " "), VOCABULARY, name, schema)
-
-
-def _outputs() -> Iterator[OutputSpec]:
-    for name in modules():
-        try:
-            processor = find(name)
-        except Exception:
-            _log.exception("processor %s cannot be imported; its signals are %s here", name, METRIC)
-            continue
-        yield from processor.outputs
 
 
 def _axis_name(name: str) -> str:
