@@ -77,7 +77,7 @@ def create_app(sources: Sources) -> FastAPI:
         job_routes(sources),
         history_routes(sources.live, sources.store),
         past_routes(sources),
-        metrics_routes(sources, fan_out),
+        metrics_routes(sources, fan_out, subscriptions),
         models_routes(sources),
         people_routes(sources.access, sources.audit),
         page_routes(sources.access, failures),

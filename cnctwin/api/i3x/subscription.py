@@ -66,8 +66,9 @@ class Subscription:
         self._waiting = 0
         self._newest = self._returned = self._acknowledged = self._dropped = 0
 
-    def put(self, updates: Sequence[Update]) -> None:
-        """Queue updates that came together."""
+    def put(self, updates: Sequence[Update]) -> int:
+        """Queue updates that came together; return how many older ones had to make room."""
+        before = self._waiting + len(updates)
         for start in range(0, len(updates), BATCH_MAX):
             self._newest += 1
             self._batches.append(Numbered(self._newest, updates[start : start + BATCH_MAX]))
@@ -76,6 +77,7 @@ class Subscription:
             self._dropped = self._remove().sequence
         if self.stream is not None and updates:
             self.stream.wake()
+        return before - self._waiting
 
     def acknowledge(self, last: int | None) -> None:
         """Forget what the client has. A number that it cannot have been given changes nothing."""

@@ -28,6 +28,7 @@ class Subscriptions:
     """The subscriptions of all clients over one address space."""
 
     def __init__(self, space: Space, clock: Callable[[], float] = monotonic) -> None:
+        self.dropped = 0
         self._space, self._live, self._clock = space, space.live, clock
         self._held: dict[str, Subscription] = {}
         self._watched: frozenset[str | None] = frozenset()
@@ -95,7 +96,7 @@ class Subscriptions:
             if max_depth != 1:
                 updates += [Update(*one) for one in element.components().items()]
         self._watch()
-        subscription.put(updates)
+        self.dropped += subscription.put(updates)
         return [one is not None for one in found]
 
     def unregister(self, subscription: Subscription, element_ids: Sequence[str]) -> list[bool]:
@@ -134,7 +135,9 @@ class Subscriptions:
         if not changes:
             return
         for subscription in self._held.values():
-            subscription.put([update for machine, update in changes if _monitors(subscription, machine, update.element_id)])
+            self.dropped += subscription.put(
+                [update for machine, update in changes if _monitors(subscription, machine, update.element_id)]
+            )
 
     def _changes(self, machine: str, rows: Sequence[Row] | None) -> Iterator[Update]:
         """Yield the new values of a machine's signals, then its own where that has changed too."""

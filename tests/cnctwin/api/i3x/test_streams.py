@@ -212,8 +212,8 @@ def test_what_overflows_is_dropped_oldest_first_and_is_said_until_something_newe
     monkeypatch.setattr(one_subscription, "UPDATES_MAX", 3)
     held, _ = subscriptions()
     made = held.create(ME, "", "127.0.0.1")
-    for number in range(5):
-        made.put([Update(RPM, Vqt(float(number), "Good", number))])
+    dropped = [made.put([Update(RPM, Vqt(float(number), "Good", number))]) for number in range(5)]
+    assert dropped == [0, 0, 0, 1, 1]
     assert [(batch.sequence, batch.updates[0].vqt.value) for batch in made.pending()] == [(3, 2.0), (4, 3.0), (5, 4.0)]
     assert made.has_lost
     made.acknowledge(4)
