@@ -36,7 +36,7 @@ def i3x_application(sources: Sources, subscriptions: Subscriptions) -> FastAPI:
     for router in (
         explore_routes(space, sources.store),
         query_routes(space, sources.store),
-        subscribe_routes(space, subscriptions),
+        subscribe_routes(space, sources.store, subscriptions),
     ):
         app.include_router(router)
     _handle_errors(app)

@@ -66,7 +66,7 @@ def _values(request: Request, space: Space, asked: Values) -> Response:
 
 async def _history(request: Request, space: Space, store: StoreReader, asked: History) -> Response:
     span = range_of(asked.start_time, asked.end_time)
-    found = list(space.find(asked.element_ids))
+    found = await store.work(lambda: list(space.find(asked.element_ids)))
     wanted: dict[str, list[str]] = {}
     for one in found:
         if one is not None and one.place.signal:

@@ -12,12 +12,13 @@ from cnctwin.api.i3x.problem import Json, bulk, item, missing, success
 from cnctwin.api.i3x.requests import NewSubscription, OneSubscription, Registered, SomeSubscriptions, Sync, Unregistered
 from cnctwin.api.i3x.space import Space
 from cnctwin.api.i3x.subscription import UPDATES_MAX, Owner, Subscription
-from cnctwin.api.i3x.subscriptions import Subscriptions
+from cnctwin.api.i3x.subscriptions import Subscriptions, presents
 from cnctwin.api.live.event_stream import EventStream
+from cnctwin.api.store_reader import StoreReader
 
 
-def subscribe_routes(space: Space, held: Subscriptions) -> APIRouter:
-    """The routes. They are coroutines without a wait, so they run in the event loop, one after another."""
+def subscribe_routes(space: Space, store: StoreReader, held: Subscriptions) -> APIRouter:
+    """The routes. What they do to subscriptions they do in the event loop, without a wait in between."""
     router = APIRouter(tags=["Subscribe"], prefix="/subscriptions")
 
     @router.post("")
@@ -49,9 +50,9 @@ def subscribe_routes(space: Space, held: Subscriptions) -> APIRouter:
     @router.post("/register")
     async def register(request: Request, asked: Registered) -> Json:
         """Monitor objects from now on; their present values are the first updates."""
-        subscription = _known(held, request, asked)
-        known = held.register(subscription, list(space.find(asked.element_ids)), asked.max_depth)
-        return _each(asked.element_ids, known)
+        _known(held, request, asked)
+        found = await store.work(lambda: presents(space, asked.element_ids, asked.max_depth))
+        return _each(asked.element_ids, held.register(_known(held, request, asked), found, asked.max_depth))
 
     @router.post("/unregister")
     async def unregister(request: Request, asked: Unregistered) -> Json:

@@ -8,10 +8,11 @@ acknowledged something newer.
 
 import asyncio
 import json
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from cnctwin.api.i3x.elements import machine_id, place_of
 from cnctwin.api.i3x.vqt import Vqt, rfc3339
 
 UPDATES_MAX = 5_000
@@ -60,11 +61,35 @@ class Subscription:
     def __init__(self, subscription_id: str, owner: Owner, display_name: str, client: str, now_s: float) -> None:
         self.id, self.owner, self.display_name, self.client = subscription_id, owner, display_name, client
         self.monitored: dict[str, Monitored] = {}
+        self.machines: Counter[str] = Counter()
+        """How many objects of each machine ("" = the plant) are monitored."""
         self.used_s = now_s
         self.stream: Stream | None = None
         self._batches: deque[Numbered] = deque()
         self._waiting = 0
         self._newest = self._returned = self._acknowledged = self._dropped = 0
+
+    def monitor(self, element_id: str, monitored: Monitored) -> None:
+        """Monitor an object that is not monitored yet."""
+        self.monitored[element_id] = monitored
+        self.machines[monitored.machine] += 1
+
+    def forget(self, element_id: str) -> bool:
+        """Monitor an object no longer; return True if it was."""
+        if (known := self.monitored.pop(element_id, None)) is None:
+            return False
+        self.machines[known.machine] -= 1
+        if not self.machines[known.machine]:
+            del self.machines[known.machine]
+        return True
+
+    def monitors(self, element_id: str) -> bool:
+        """Return True if a change of this object is to be told: it is registered, or a machine is with all its signals."""
+        if element_id in self.monitored:
+            return True
+        place = place_of(element_id)
+        whole = None if place is None else self.monitored.get(machine_id(place.machine))
+        return whole is not None and whole.max_depth != 1
 
     def put(self, updates: Sequence[Update]) -> int:
         """Queue updates that came together; return how many older ones had to make room."""

@@ -7,6 +7,7 @@ import asyncio
 import secrets
 from collections.abc import Callable, Iterator, Sequence
 from time import monotonic
+from typing import NamedTuple
 
 from cnctwin.api.errors import ApiError
 from cnctwin.api.fleet import SHOWN
@@ -22,6 +23,29 @@ SUBSCRIPTIONS_MAX = 64
 OF_ONE_MAX = 16
 TTL_S = 300.0
 _SHOWN = frozenset(SHOWN.values())
+
+
+class Present(NamedTuple):
+    """An object that is to be monitored, with its present value and, where it is followed deeper, those of its components.
+
+    is_whole: the plant or a machine, of whose value only a change is told
+    """
+
+    element_id: str
+    machine: str
+    is_whole: bool
+    updates: tuple[Update, ...]
+
+
+def presents(space: Space, element_ids: list[str], max_depth: int) -> list[Present | None]:
+    """Return the objects of these ids as they are now, None for each that there is not; it may take a moment."""
+    return [None if one is None else _present(one, max_depth) for one in space.find(element_ids)]
+
+
+def _present(one: Element, max_depth: int) -> Present:
+    below = one.components() if max_depth != 1 else {}
+    updates = (Update(one.element_id, one.value()), *(Update(*component) for component in below.items()))
+    return Present(one.element_id, one.place.machine, not one.place.signal, updates)
 
 
 class Subscriptions:
@@ -81,27 +105,23 @@ class Subscriptions:
             subscription.stream.end()
         self._watch()
 
-    def register(self, subscription: Subscription, found: Sequence[Element | None], max_depth: int) -> list[bool]:
+    def register(self, subscription: Subscription, found: Sequence[Present | None], max_depth: int) -> list[bool]:
         """Monitor objects, and queue their present values; return which of them there are. Raises ApiError at the limit."""
-        new = [one for one in found if one is not None and one.element_id not in subscription.monitored]
-        if len(subscription.monitored) + len(new) > MONITORED_MAX:
+        known = subscription.monitored
+        new = {one.element_id: one for one in found if one is not None and one.element_id not in known}.values()
+        if len(known) + len(new) > MONITORED_MAX:
             raise ApiError(400, f"a subscription monitors at most {MONITORED_MAX} objects; register a machine with maxDepth 0")
-        updates: list[Update] = []
-        for element in new:
-            subscription.monitored[element.element_id] = Monitored(element.place.machine, max_depth)
-            value = element.value()
-            updates.append(Update(element.element_id, value))
-            if element.is_composition or not element.place.machine:
-                self._last.setdefault(element.element_id, value)
-            if max_depth != 1:
-                updates += [Update(*one) for one in element.components().items()]
+        for one in new:
+            subscription.monitor(one.element_id, Monitored(one.machine, max_depth))
+            if one.is_whole:
+                self._last.setdefault(one.element_id, one.updates[0].vqt)
         self._watch()
-        self.dropped += subscription.put(updates)
+        self.dropped += subscription.put([update for one in new for update in one.updates])
         return [one is not None for one in found]
 
     def unregister(self, subscription: Subscription, element_ids: Sequence[str]) -> list[bool]:
         """Monitor objects no longer; return which of them were monitored. What waits already stays."""
-        known = [subscription.monitored.pop(one, None) is not None for one in element_ids]
+        known = [subscription.forget(one) for one in element_ids]
         self._watch()
         return known
 
@@ -127,17 +147,15 @@ class Subscriptions:
     def deliver(self, batches: Sequence[Batch]) -> None:
         """Queue what has changed for each subscription that monitors it."""
         self._expire()
-        changes: list[tuple[str, Update]] = []
+        changes: dict[str, list[Update]] = {}
         for machine, _, rows in batches:
             if machine is not None and machine in self._watched and (rows is None or rows):
-                changes += ((machine, update) for update in self._changes(machine, rows))
-        changes += (("", update) for update in self._plant_changes())
-        if not changes:
-            return
-        for subscription in self._held.values():
-            self.dropped += subscription.put(
-                [update for machine, update in changes if _monitors(subscription, machine, update.element_id)]
-            )
+                changes.setdefault(machine, []).extend(self._changes(machine, rows))
+        if plant := list(self._plant_changes()):
+            changes[""] = plant
+        for subscription in self._held.values() if changes else ():
+            told = [update for machine in changes.keys() & subscription.machines.keys() for update in changes[machine]]
+            self.dropped += subscription.put([update for update in told if subscription.monitors(update.element_id)])
 
     def _changes(self, machine: str, rows: Sequence[Row] | None) -> Iterator[Update]:
         """Yield the new values of a machine's signals, then its own where that has changed too."""
@@ -165,7 +183,7 @@ class Subscriptions:
     def _watch(self) -> None:
         """Have the live plant tell what the subscriptions monitor, and no more."""
         # The plant (None) is heard of as a reader of the fleet.
-        wanted = frozenset(one.machine or None for held in self._held.values() for one in held.monitored.values())
+        wanted = frozenset(machine or None for held in self._held.values() for machine in held.machines)
         for machine in wanted - self._watched:
             self._live.watch(machine)
         for machine in self._watched - wanted:
@@ -179,10 +197,3 @@ class Subscriptions:
         oldest_s = self._clock() - TTL_S
         for one in [one for one in self._held.values() if one.stream is None and one.used_s < oldest_s]:
             self.delete(one)
-
-
-def _monitors(subscription: Subscription, machine: str, element_id: str) -> bool:
-    if element_id in subscription.monitored:
-        return True
-    whole = subscription.monitored.get(machine_id(machine)) if machine else None
-    return whole is not None and whole.max_depth != 1

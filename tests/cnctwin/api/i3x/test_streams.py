@@ -16,7 +16,7 @@ from cnctwin.api.i3x import subscriptions as all_subscriptions
 from cnctwin.api.i3x.problem import PREFIX
 from cnctwin.api.i3x.space import Space
 from cnctwin.api.i3x.subscription import Owner, Update
-from cnctwin.api.i3x.subscriptions import Subscriptions
+from cnctwin.api.i3x.subscriptions import Subscriptions, presents
 from cnctwin.api.i3x.vqt import Vqt
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.server import Server
@@ -168,7 +168,7 @@ def test_an_abandoned_subscription_is_deleted_and_watches_nothing_any_more() -> 
     live = small_plant()
     held, clock = subscriptions(live)
     made = held.create(ME, "", "127.0.0.1")
-    held.register(made, list(held._space.find(["machine/vmc", "plant"])), 1)
+    held.register(made, presents(held._space, ["machine/vmc", "plant"], 1), 1)
     clock.now_s = all_subscriptions.TTL_S - 1.0
     assert held.find(made.id, ME) is made
     held.used(made)
@@ -176,6 +176,17 @@ def test_an_abandoned_subscription_is_deleted_and_watches_nothing_any_more() -> 
     assert held.find(made.id, ME) is None
     assert len(held) == 0
     assert (live._waiting, live._fleet_readers) == ({}, 0)
+
+
+def test_what_is_registered_twice_at_once_is_watched_until_it_is_unregistered_once() -> None:
+    live = small_plant()
+    held, _ = subscriptions(live)
+    made = held.create(ME, "", "127.0.0.1")
+    held.register(made, presents(held._space, [RPM, RPM, "machine/vmc"], 1), 1)
+    assert [element for element, _, _ in values_of(made)] == [RPM, "machine/vmc"]
+    assert set(live._waiting) == {"vmc"}
+    assert held.unregister(made, [RPM, "machine/vmc", RPM]) == [True, True, False]
+    assert (made.machines, live._waiting) == ({}, {})
 
 
 def test_a_subscription_with_an_open_stream_is_not_abandoned() -> None:
@@ -225,9 +236,9 @@ def test_only_what_is_monitored_is_told_and_a_machine_only_where_its_own_value_c
     live = small_plant()
     held, _ = subscriptions(live)
     signal, machine, whole = (held.create(Owner(name, None), "", "127.0.0.1") for name in ("signal", "machine", "whole"))
-    held.register(signal, list(held._space.find([RPM])), 1)
-    held.register(machine, list(held._space.find(["machine/vmc"])), 1)
-    held.register(whole, list(held._space.find(["machine/vmc"])), 0)
+    held.register(signal, presents(held._space, [RPM], 1), 1)
+    held.register(machine, presents(held._space, ["machine/vmc"], 1), 1)
+    held.register(whole, presents(held._space, ["machine/vmc"], 0), 0)
     for one in (signal, machine, whole):
         one.acknowledge(one_subscription.CLEAR)
     told(held, live)  # the state of a machine that is watched from now on
@@ -248,7 +259,7 @@ def test_the_death_of_an_edge_makes_values_uncertain_and_a_new_machine_changes_t
     live = small_plant()
     held, _ = subscriptions(live)
     made = held.create(ME, "", "127.0.0.1")
-    held.register(made, list(held._space.find(["plant", RPM])), 1)
+    held.register(made, presents(held._space, ["plant", RPM], 1), 1)
     made.acknowledge(one_subscription.CLEAR)
     told(held, live, death({"spindle_rpm": 6000.0}, now()))
     assert (RPM, 6000.0, "Uncertain") in values_of(made)
@@ -259,7 +270,6 @@ def test_the_death_of_an_edge_makes_values_uncertain_and_a_new_machine_changes_t
 def test_a_subscription_monitors_only_so_many_objects() -> None:
     held, _ = subscriptions()
     made = held.create(ME, "", "127.0.0.1")
-    (element,) = held._space.find(["plant"])
     made.monitored = {str(number): one_subscription.Monitored("", 1) for number in range(one_subscription.MONITORED_MAX)}
     with pytest.raises(ApiError, match="at most 1000 objects"):
-        held.register(made, [element], 1)
+        held.register(made, presents(held._space, ["plant"], 1), 1)
