@@ -11,7 +11,7 @@ from cnctwin.api.i3x.answer import answer
 from cnctwin.api.i3x.explore import entries
 from cnctwin.api.i3x.history import SIGNALS_MAX, Past, Range, no_values, pasts, range_of
 from cnctwin.api.i3x.problem import Json, bulk, failure, item, missing
-from cnctwin.api.i3x.requests import History, Values, Written
+from cnctwin.api.i3x.requests import History, Values
 from cnctwin.api.i3x.space import Element, Space
 from cnctwin.api.store_reader import StoreReader
 
@@ -34,12 +34,12 @@ def query_routes(space: Space, store: StoreReader) -> APIRouter:
         return await _history(request, space, store, asked)
 
     @router.put("/objects/value")
-    async def write_value(_: Written) -> Response:
+    async def write_value() -> Response:
         """Not implemented, on purpose."""
         return JSONResponse(failure(501, NOT_WRITTEN), 501)
 
     @router.put("/objects/history")
-    async def write_history(_: Written) -> Response:
+    async def write_history() -> Response:
         """Not implemented, on purpose."""
         return JSONResponse(failure(501, NOT_WRITTEN), 501)
 

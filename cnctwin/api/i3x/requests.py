@@ -1,6 +1,6 @@
 """What clients send, checked before anything is done with it."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt
 from pydantic.alias_generators import to_camel
@@ -94,6 +94,3 @@ class Sync(OneSubscription):
     """A poll: the number up to which the client has everything, -1 for all."""
 
     last_sequence_number: StrictInt | None = None
-
-
-Written = dict[str, Any]

@@ -322,6 +322,34 @@ def test_minus_one_clears_everything_and_an_impossible_number_nothing(server: Se
     assert batch["sequenceNumber"] > known[-1]["sequenceNumber"]
 
 
+@pytest.mark.parametrize(
+    ("path", "body", "line"),
+    [
+        ("/objects/value", b'{"elementIds": "plant"}', "elementIds is 'plant'"),
+        ("/objects/value", b'{"elementIds": ["\\ud800"]}', "elementIds.0"),
+        ("/objects/value", b'{"elementIds": ["plant"], "maxDepth": -1}', "maxDepth is -1"),
+        ("/objects/value", b"[" * 5000, "body"),
+        ("/objects/list", b"{}", "elementIds is missing; /i3x/v1/openapi.json has an example"),
+        ("/objects/related", b'{"elementIds": [1]}', "elementIds.0 is 1"),
+        ("/objecttypes/query", b"\xff", "parsing the body"),
+        ("/subscriptions", b'{"clientId": ""}', "clientId is ''"),
+    ],
+)
+def test_a_malformed_request_is_refused_in_one_line_that_names_it(server: Server, path: str, body: bytes, line: str) -> None:
+    headers = {"Authorization": f"Bearer {TOKEN}", "Content-Type": "application/json"}
+    answer = server.client.post(PREFIX + path, headers=headers, content=body)
+    assert answer.status_code == 400
+    said = failed(answer.json(), 400)
+    assert line in said
+    assert "\n" not in said
+
+
+def test_no_more_ids_than_the_limit_are_taken_at_once(server: Server) -> None:
+    assert "elementIds" in failed(server.post("/objects/value", 400, elementIds=["plant"] * 1001), 400)
+    headers = {"Authorization": f"Bearer {TOKEN}"}
+    assert server.client.post(f"{PREFIX}/objects/value", headers=headers, content=b" " * 300_001).status_code == 413
+
+
 def test_what_is_no_method_of_i3x_is_refused_in_its_shape(server: Server) -> None:
     for method, path, status in (("GET", "/nothing", 404), ("DELETE", "/objects", 405), ("GET", "/objects/value", 405)):
         headers = {"Authorization": f"Bearer {TOKEN}"}
