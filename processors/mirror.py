@@ -4,19 +4,26 @@
 
 quality is good, stale (its edge is offline; the value is the last one) or bad. A null stays null, with its reason. History is not
 mirrored: a topic holds the present. Neither are arrays of more than 256 numbers, the raw blocks of sensors.
+
+Where it is asked for, each machine is announced to Home Assistant too (home_assistant.py) with each birth, and withdrawn with the
+first message after that is no longer asked for.
 """
 
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from types import MappingProxyType
 
+from pydantic import Field
 from pydantic_core import to_json
 
 from processors.config import ProcessorConfig
-from processors.contract import NoState, PlainOutput, PlainSpec, Processor, Sample, SampleKind
+from processors.contract import PlainOutput, PlainSpec, Processor, Sample, SampleKind
+from processors.home_assistant import PREFIX as HOME_ASSISTANT
+from processors.home_assistant import announcement, entities, topic_of
 from processors.plain_topic import topic_level, topic_path
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
@@ -33,13 +40,45 @@ _ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",",
 
 
 class Config(ProcessorConfig):
-    """Nothing of its own: it is on or off."""
+    """The mirror's own topics are always published; these are about Home Assistant."""
+
+    home_assistant: bool = Field(default=False, description="announce the machine to Home Assistant by MQTT discovery")
+    home_assistant_entities_max: int = Field(default=100, ge=1, le=500, description="signals of one machine that are announced")
 
 
-def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[PlainOutput]]:
+@dataclass(frozen=True, slots=True)
+class State:
+    """What of a machine is announced to Home Assistant: platform and id of each entity; nothing where it is not asked for."""
+
+    announced: tuple[str, ...] = ()
+
+
+def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[PlainOutput]]:
     """Publish what changed; at a death, what turned stale."""
     if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
         return state, ()
+    outputs = _changed(sample)
+    if not config.home_assistant:
+        if not state.announced:
+            return state, outputs
+        return State(), [*outputs, PlainOutput(topic_of(sample.machine), b"")]
+    if sample.kind is not SampleKind.BIRTH:
+        return state, outputs
+    announced, output = _announced(config, state, sample)
+    return announced, [*outputs, output]
+
+
+def _announced(config: Config, state: State, sample: Sample) -> tuple[State, PlainOutput]:
+    """Announce what is known of a machine, and withdraw what of it is not known any more."""
+    every = entities(sample.row)
+    shown = every[: config.home_assistant_entities_max]
+    components = tuple(sorted(one.component for one in shown))
+    removed = sorted(set(state.announced).difference(components))
+    payload = announcement(sample.machine, shown, len(every) - len(shown), removed)
+    return State(components), PlainOutput(topic_of(sample.machine), payload)
+
+
+def _changed(sample: Sample) -> list[PlainOutput]:
     row, names = sample.row, sample.changed
     readings = [row[name] for name in names]
     payloads = _numbers(readings)
@@ -49,7 +88,7 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
         texts = _texts([one.value for one in readings if type(one.value) is float])
         payloads = [mirrored(one, texts) for one in readings]
     topics_of = _topics(sample.machine, names)
-    return state, [_new(PlainOutput, (topic, payload, 0, True)) for topic, payload in zip(topics_of, payloads, strict=True)]
+    return [_new(PlainOutput, (topic, payload, 0, True)) for topic, payload in zip(topics_of, payloads, strict=True)]
 
 
 def _numbers(readings: Sequence[Reading]) -> list[bytes] | None:
@@ -143,12 +182,15 @@ _path = lru_cache(maxsize=10_000)(topic_path)
 
 PROCESSOR = Processor(
     name="mirror",
-    version=1,
+    version=2,
     inputs=None,
     outputs=(),
-    plain=(PlainSpec(PREFIX, "the last value of each signal of each machine"),),
+    plain=(
+        PlainSpec(PREFIX, "the last value of each signal of each machine"),
+        PlainSpec(HOME_ASSISTANT, "what Home Assistant has to know of each machine, where it is asked for", qos=1),
+    ),
     config=Config,
-    state=NoState,
-    initial=lambda _: NoState(),
+    state=State,
+    initial=lambda _: State(),
     step=step,
 )

@@ -19,11 +19,13 @@ from typing import NamedTuple
 
 from cnctwin.api.door.role import SAFE_METHODS, Role, right_of
 from cnctwin.api.door.users import User
+from cnctwin.api.i3x.problem import PREFIX as I3X
 
 COOKIE = "cnctwin_session"
 SESSION_S = 12 * 3600
 LOCAL_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
-OPEN_PATHS = frozenset({"/", "/livez", "/readyz", "/login"})  # the page itself says nothing of the plant, and asks for the token
+OPEN_PATHS = frozenset({"/", "/livez", "/readyz", "/login", f"{I3X}/info"})
+"""None of them says anything of the plant: the page asks for the token, and i3X has its /info answered before."""
 OPEN_FOLDER = "/page/"
 
 

@@ -1,7 +1,7 @@
 """The application: all routes over what it stands on."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
@@ -10,6 +10,11 @@ from fastapi import FastAPI
 from cnctwin.api.errors import handle_errors
 from cnctwin.api.failures import Failures
 from cnctwin.api.guard import Guard
+from cnctwin.api.i3x.application import i3x_application
+from cnctwin.api.i3x.problem import PREFIX as I3X
+from cnctwin.api.i3x.space import Space
+from cnctwin.api.i3x.subscriptions import Subscriptions
+from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.routes.alerts import alert_routes
 from cnctwin.api.routes.anomaly import anomaly_routes
@@ -34,12 +39,19 @@ ABOUT = "A digital twin of CNC machines: state, predictions, history, gaps, aler
 def create_app(sources: Sources) -> FastAPI:
     """The application. It starts no thread: `cnctwin serve` starts the viewer that feeds `sources.live`."""
     fan_out = FanOut(sources.live)
+    subscriptions = Subscriptions(Space(sources.live))
+
+    def tell(batches: Sequence[Batch]) -> None:
+        fan_out.send(batches)
+        subscriptions.send(batches)
+
     if sources.viewer is not None:
-        sources.viewer.on_batches = fan_out.send
+        sources.viewer.on_batches = tell
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        fan_out.attach(asyncio.get_running_loop())
+        for streams in (fan_out, subscriptions):
+            streams.attach(asyncio.get_running_loop())
         yield
 
     app = FastAPI(
@@ -65,7 +77,7 @@ def create_app(sources: Sources) -> FastAPI:
         job_routes(sources),
         history_routes(sources.live, sources.store),
         past_routes(sources),
-        metrics_routes(sources, fan_out),
+        metrics_routes(sources, fan_out, subscriptions),
         models_routes(sources),
         people_routes(sources.access, sources.audit),
         page_routes(sources.access, failures),
@@ -73,6 +85,8 @@ def create_app(sources: Sources) -> FastAPI:
         app.include_router(router)
     if sources.envelope.is_given:
         app.include_router(sealed_routes(sources.envelope))
+    app.mount(I3X, i3x_application(sources, subscriptions))
     serve_page(app)
     app.state.fan_out, app.state.sources = fan_out, sources
+    app.state.subscriptions, app.state.tell = subscriptions, tell
     return app

@@ -7,6 +7,8 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
+from cnctwin.api.i3x.problem import PREFIX as I3X
+from cnctwin.api.i3x.problem import failure
 from cnctwin.api.security_headers import HEADERS
 from cnctwin.errors import ApplicationError
 
@@ -22,10 +24,11 @@ class ApiError(ApplicationError):
         self.headers = headers or {}
 
 
-def error_response(status: int, line: str, headers: dict[str, str] | None = None) -> Response:
-    """The one shape of all errors."""
+def error_response(status: int, line: str, headers: dict[str, str] | None = None, *, path: str = "") -> Response:
+    """The one shape of all errors; below i3X's prefix, the one that i3X has."""
     text = " ".join(line.split())[:LINE_MAX]
-    return Response(json.dumps({"error": text}), status, headers, "application/json")
+    body = failure(status, text) if path.startswith(f"{I3X}/") else {"error": text}
+    return Response(json.dumps(body), status, headers, "application/json")
 
 
 def handle_errors(app: FastAPI) -> None:
@@ -62,7 +65,7 @@ def handle_errors(app: FastAPI) -> None:
     app.add_exception_handler(Exception, bug)
 
 
-def request_trouble(errors: Any) -> str:
+def request_trouble(errors: Any, document: str = "/openapi.json") -> str:
     """The first thing that is wrong with a request, in one line that names it and its value.
 
     >>> request_trouble([{"loc": ("body", "dt_s"), "msg": "Input should be greater than 0", "input": -1}])
@@ -74,8 +77,8 @@ def request_trouble(errors: Any) -> str:
     said = str(first["msg"]).removeprefix("Value error, ")
     value = repr(first.get("input"))
     if first["type"] == "missing" if "type" in first else False:
-        return f"{name} is missing; /openapi.json has an example"
+        return f"{name} is missing; {document} has an example"
     shown = value if len(value) <= 60 else f"{value[:57]}…"
     if first.get("type") == "value_error" and len(places) <= 1:
         return said
-    return f"{name} is {shown}: {said}; /openapi.json has an example"
+    return f"{name} is {shown}: {said}; {document} has an example"

@@ -42,14 +42,14 @@ class Guard:
         right = right_of(asking.method, asking.path)
         if self._under_way[client] >= UNDER_WAY_MAX:
             line = f"{client} has {UNDER_WAY_MAX} requests under way, which is the limit; wait for their answers"
-            await error_response(503, line, {"Retry-After": "2"})(scope, receive, answer.send)
+            await error_response(503, line, {"Retry-After": "2"}, path=asking.path)(scope, receive, answer.send)
             return
         state: dict[str, Any] = scope.setdefault("state", {})
         state |= {"client": client, "user": None, "role": None}
         self._under_way[client] += 1
         try:
             if is_too_long(asking.path, asking.headers.get("content-length", "0")):
-                await error_response(413, too_long(asking.path))(scope, receive, answer.send)
+                await error_response(413, too_long(asking.path), path=asking.path)(scope, receive, answer.send)
             else:
                 verdict = self._access.judge(asking, time.time())
                 state |= {"user": verdict.user, "role": verdict.role}
@@ -71,7 +71,7 @@ class Guard:
         if verdict.is_wrong_token and (wait_s := self._failures.add(client, time.monotonic())):
             status, line, headers = 429, *too_many(client, wait_s)
             await asyncio.sleep(DELAY_S)
-        await error_response(status, line, headers)(scope, receive, answer.send)
+        await error_response(status, line, headers, path=scope["path"])(scope, receive, answer.send)
 
     def _note(self, right: Right, state: dict[str, Any], answer: "_Answer") -> None:
         role: Role | None = state["role"]
@@ -115,7 +115,8 @@ def too_many(client: str, wait_s: float) -> tuple[str, dict[str, str]]:
 
 def _error(body: bytes) -> str:
     try:
-        return str(json.loads(body)["error"])
+        said = json.loads(body)
+        return str(said["error"] if "error" in said else said["responseDetail"]["detail"])
     except (ValueError, KeyError, TypeError):
         return ""
 

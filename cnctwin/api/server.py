@@ -10,6 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from cnctwin.api.door.connection import Connection
+from cnctwin.api.i3x.subscriptions import Subscriptions
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.errors import ApplicationError, UsageError
 
@@ -22,7 +23,7 @@ UNACKNOWLEDGED_MS_MAX = 30_000
 class _StreamServer(uvicorn.Server):
     """Listens no more before it ends the streams: their clients come back at once, and would be let in by the one that stops."""
 
-    def __init__(self, config: uvicorn.Config, streams: FanOut) -> None:
+    def __init__(self, config: uvicorn.Config, *streams: FanOut | Subscriptions) -> None:
         super().__init__(config)
         self._streams = streams
 
@@ -30,7 +31,8 @@ class _StreamServer(uvicorn.Server):
         """Stop, within `STOP_S_MAX` for what is under way."""
         for listener in self.servers:
             listener.close()
-        self._streams.end()
+        for streams in self._streams:
+            streams.end()
         await super().shutdown(sockets)
 
 
@@ -55,7 +57,7 @@ class Server:
             timeout_keep_alive=KEEP_ALIVE_S,
             timeout_graceful_shutdown=STOP_S_MAX,
         )
-        self._server = _StreamServer(config, app.state.fan_out)
+        self._server = _StreamServer(config, app.state.fan_out, app.state.subscriptions)
         self._thread = threading.Thread(target=self._server.run, args=([self._socket],), name="http", daemon=True)
 
     @property

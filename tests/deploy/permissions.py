@@ -11,6 +11,7 @@ OUTBOX = tuple(f"cnctwin/alerts/{kind}/a1" for kind in ("outbox", "claim", "deli
 ALERTS_STATE = "cnctwin/alerts/state"
 COMMANDS = tuple(f"cnctwin/alerts/command/{name}" for name in ("ack", "silence", "unsilence", "test"))
 MIRROR = ("cnc/okuma/spindle_rpm", "cnc/okuma/twin/raw_score")
+HOME_ASSISTANT = "homeassistant/device/cnctwin/okuma/config"
 ASK_FOR_JOBS = ("cnc/jobs/request", "cnc/jobs/cancel")
 JOB = "cnc/jobs/night-7/state"
 JOBS = ("cnc/jobs/state", "cnc/jobs/reply/night-7")
@@ -24,6 +25,9 @@ ELSEWHERE = (
     "spBv1.0/cnc/NBIRTH/edge-okuma/okuma/deeper",
     "cnctwin/other",
     "$SYS/x",
+    "homeassistant/device/other/okuma/config",
+    "homeassistant/device/cnctwin/okuma/set",
+    "homeassistant/status",
 )
 
 
@@ -58,6 +62,7 @@ ALL = sorted(
         ALERTS_STATE,
         *COMMANDS,
         *MIRROR,
+        HOME_ASSISTANT,
         *ASK_FOR_JOBS,
         JOB,
     }
@@ -70,7 +75,7 @@ MAY_WRITE: dict[str, frozenset[str]] = {
     | said_by("twin-jobs")
     | ASK_FOR_BIRTHS
     | RECEIPTS
-    | {STATES[0], SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
+    | {STATES[0], SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR, HOME_ASSISTANT}
     | {*ASK_FOR_JOBS, JOB, *JOBS, *DESCRIPTIONS, LOOP},
     "viewer": frozenset(),
     "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS) | set(ASK_THE_LOOP) | {VERDICT},

@@ -42,6 +42,9 @@ VALIDATION_BARRIER = f"{OWN}validation-barrier"
 MIRROR = "cnc/"
 """Machine and signal, retained: what the mirror publishes for clients that speak no Sparkplug."""
 
+HOME_ASSISTANT = "homeassistant/device/cnctwin/"
+"""Machine and `config`, retained, where the mirror is asked for it (processors/home_assistant.py)."""
+
 JOBS = f"{MIRROR}jobs/"
 """Beside the metrics of the node `twin-jobs`."""
 RESERVED_MACHINES = (JOBS.removeprefix(MIRROR).rstrip("/"),)

@@ -3,7 +3,10 @@
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
+from cnctwin.api.i3x.problem import PREFIX as I3X
+
 BODY_BYTES_MAX = 16_384
+I3X_BYTES_MAX = 300_000  # element ids, a thousand of them
 OF_PATH = {
     "/login": 4_096,
     "/predict": 8_000_000,  # courses of 100,000 steps
@@ -13,7 +16,7 @@ OF_PATH = {
 
 def bytes_max(path: str) -> int:
     """Return how long the body of a request to this path may be."""
-    return OF_PATH.get(path, BODY_BYTES_MAX)
+    return OF_PATH.get(path, I3X_BYTES_MAX if path.startswith(f"{I3X}/") else BODY_BYTES_MAX)
 
 
 def too_long(path: str) -> str:

@@ -4,6 +4,8 @@ import re
 from enum import IntEnum
 from typing import NamedTuple
 
+from cnctwin.api.i3x.problem import PREFIX as I3X
+
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -33,6 +35,9 @@ _TABLE = tuple(
     for method, pattern, role, action in (
         ("POST", "/predict", Role.READER, ""),
         ("POST", "/twin/replay", Role.READER, ""),
+        ("POST", f"{I3X}/(objecttypes/query|relationshiptypes/query|objects/(list|related|value|history))", Role.READER, ""),
+        ("POST", f"{I3X}/subscriptions(/(list|delete|register|unregister|sync|stream))?", Role.READER, ""),
+        ("PUT", f"{I3X}/objects/(value|history)", Role.READER, ""),  # refused: nothing is written
         ("POST", "/login", Role.READER, "log in"),
         ("POST", "/logout", Role.READER, "log out"),
         ("POST", "/alerts/([^/]+)/acknowledge", Role.OPERATOR, "acknowledge"),

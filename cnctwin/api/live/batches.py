@@ -13,10 +13,14 @@ ALL = "*"  # readers of the fleet, and of any machine
 
 
 class Batch(NamedTuple):
-    """An event and who is to have it: the readers of a machine, of the fleet (None), or all (`ALL`)."""
+    """An event and who is to have it: the readers of a machine, of the fleet (None), or all (`ALL`).
+
+    rows: what has changed of a machine, for readers that take it apart; None where its whole state is to be read again
+    """
 
     machine: str | None
     payload: bytes
+    rows: Sequence[Row] | None = ()
 
 
 @dataclass(slots=True)
@@ -41,7 +45,7 @@ def event(name: str, value: Any) -> bytes:
 
 def state_batch(machine: str, state: dict[str, Any]) -> Batch:
     """The whole state of a machine."""
-    return Batch(machine, event("state", state))
+    return Batch(machine, event("state", state), None)
 
 
 def machine_rows(machine: str, now_ms: int, rows: Sequence[Row], *, online: bool, left_out: int) -> Batch:
@@ -54,7 +58,7 @@ def machine_rows(machine: str, now_ms: int, rows: Sequence[Row], *, online: bool
     }
     if left_out:
         said["left_out"] = left_out
-    return Batch(machine, event("rows", said))
+    return Batch(machine, event("rows", said), None if left_out else rows)
 
 
 def fleet_rows(now_ms: int, rows: Sequence[tuple[str, Row]]) -> Batch:

@@ -5,12 +5,11 @@ or when the server stops. The client (`EventSource`) comes back by itself and is
 """
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
-
-from cnctwin.api.live.fan_out import FanOut, Reader
 
 KEEP_ALIVE_S = 15.0
 SEND_S_MAX = 10.0
@@ -18,14 +17,14 @@ RETRY_MS = 1000
 
 
 class EventStream(Response):
-    """`first` is sent at once, then what the reader is told."""
+    """`first` is sent at once, then what `following` gives, until it gives None. `close` is called at the end."""
 
     media_type = "text/event-stream"
 
-    def __init__(self, fan_out: FanOut, reader: Reader, first: bytes) -> None:
+    def __init__(self, first: bytes, following: Callable[[], Awaitable[bytes | None]], close: Callable[[], None]) -> None:
         super().__init__(headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
         del self.headers["content-length"]
-        self._fan_out, self._reader = fan_out, reader
+        self._following, self._close = following, close
         self._first = b"retry: %d\n\n" % RETRY_MS + first
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -35,7 +34,7 @@ class EventStream(Response):
         try:
             await asyncio.wait((told, gone), return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._fan_out.close(self._reader)
+            self._close()
             for task in (told, gone):
                 task.cancel()
                 with suppress(asyncio.CancelledError, OSError, TimeoutError):
@@ -47,7 +46,7 @@ class EventStream(Response):
         while payload is not None:
             await asyncio.wait_for(send({"type": "http.response.body", "body": payload, "more_body": True}), SEND_S_MAX)
             try:
-                payload = await asyncio.wait_for(self._reader.messages.get(), KEEP_ALIVE_S)
+                payload = await asyncio.wait_for(self._following(), KEEP_ALIVE_S)
             except TimeoutError:
                 payload = b": still here\n\n"
         await send({"type": "http.response.body", "body": b"", "more_body": False})

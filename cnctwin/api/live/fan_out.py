@@ -95,7 +95,7 @@ class FanOut:
             reader.end()
 
     def _deliver(self, batches: Sequence[Batch]) -> None:
-        for machine, payload in batches:
+        for machine, payload, _ in batches:
             if machine == ALL:
                 readers = [one for group in self._readers.values() for one in group]
             else:

@@ -1,7 +1,7 @@
 """The plant as Prometheus metrics. Each scrape is read from the live plant anew; nothing is counted here."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -68,12 +68,20 @@ MACHINE_GAUGES = {
 }
 
 
+class Served(NamedTuple):
+    """The figures of this server's own readers."""
+
+    streams: int
+    streams_dropped: int
+    subscriptions: int
+    updates_dropped: int
+
+
 class PlantCollector(Collector):
     """All metrics of one scrape."""
 
-    def __init__(self, sources: Sources, status: Status | None, streams: int, dropped: int, now_ms: int) -> None:
-        self._sources, self._status, self._now_ms = sources, status, now_ms
-        self._streams, self._dropped = streams, dropped
+    def __init__(self, sources: Sources, status: Status | None, served: Served, now_ms: int) -> None:
+        self._sources, self._status, self._served, self._now_ms = sources, status, served, now_ms
 
     def collect(self) -> Iterator[Metric]:
         """The families, in groups: machines, nodes, alerts, store, this server."""
@@ -107,8 +115,13 @@ class PlantCollector(Collector):
 
     def _server(self) -> Iterator[Metric]:
         viewer, counts = self._sources.viewer, self._sources.live.counts
-        yield GaugeMetricFamily("twin_page_streams", "open streams", self._streams)
-        yield CounterMetricFamily("twin_page_streams_dropped", "streams let go because they did not keep up", self._dropped)
+        served = self._served
+        yield GaugeMetricFamily("twin_page_streams", "open streams", served.streams)
+        yield CounterMetricFamily(
+            "twin_page_streams_dropped", "streams let go because they did not keep up", served.streams_dropped
+        )
+        yield GaugeMetricFamily("twin_i3x_subscriptions", "subscriptions over i3X", served.subscriptions)
+        yield CounterMetricFamily("twin_i3x_updates_dropped", "updates that no client came for in time", served.updates_dropped)
         yield CounterMetricFamily("twin_page_messages", "messages of machines that this server has heard", counts["messages"])
         refused = CounterMetricFamily("twin_page_refused", "what this server could not take over", labels=["what"])
         for what in ("readings", "documents"):

@@ -4,8 +4,9 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from cnctwin.api.errors import ApiError
+from cnctwin.api.i3x.subscriptions import Subscriptions
 from cnctwin.api.live.fan_out import FanOut
-from cnctwin.api.prometheus.text import PlantCollector, text
+from cnctwin.api.prometheus.text import PlantCollector, Served, text
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.contract import Status
@@ -14,7 +15,7 @@ from sparkplug.clock import now_ms
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
-def metrics_routes(sources: Sources, fan_out: FanOut) -> APIRouter:
+def metrics_routes(sources: Sources, fan_out: FanOut, subscriptions: Subscriptions) -> APIRouter:
     """The route."""
     router = APIRouter(tags=["health"])
 
@@ -27,7 +28,8 @@ def metrics_routes(sources: Sources, fan_out: FanOut) -> APIRouter:
                 status = await sources.store.status()
             except (ApiError, ApplicationError):
                 status = None
-        collector = PlantCollector(sources, status, len(fan_out), fan_out.dropped, now_ms())
+        served = Served(len(fan_out), fan_out.dropped, len(subscriptions), subscriptions.dropped)
+        collector = PlantCollector(sources, status, served, now_ms())
         return Response(await sources.store.work(lambda: text(collector)), media_type=MEDIA_TYPE)
 
     return router

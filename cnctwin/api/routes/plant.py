@@ -1,5 +1,6 @@
 """GET /machines, /state/{machine} and /stream: the plant as it is now."""
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
@@ -53,7 +54,7 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
             first = event("fleet", {"now": now_ms(), **live.notices()._asdict(), "machines": live.fleet()})
         else:
             first = event("state", known_state(live, machine))
-        return EventStream(fan_out, reader, first)
+        return EventStream(first, reader.messages.get, partial(fan_out.close, reader))
 
     return router
 

@@ -119,6 +119,8 @@ def value(text: str, name: str, **labels: str) -> float:
         ("twin_validation_nights_over_budget", {"machine": "vmc"}, 1.0),
         ("twin_validation_last_run_timestamp_seconds", {"machine": "vmc"}, 1_777_600_000.0),
         ("twin_page_streams", {}, 0.0),
+        ("twin_i3x_subscriptions", {}, 0.0),
+        ("twin_i3x_updates_dropped_total", {}, 0.0),
         ("twin_model_missing", {"model": "residual"}, 0.0),
     ],
 )  # fmt: skip
