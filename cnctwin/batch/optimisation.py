@@ -1,4 +1,4 @@
-"""Runs an optimisation and writes its files: for the command line, and for a job."""
+"""Runs an optimisation and writes its files: for the command line, for a job, and for Python."""
 
 import json
 import time
@@ -105,12 +105,17 @@ def run(
 
     hooks = Hooks(spread=spread, progress=progress, save=save, stop=stop, clock=time.monotonic)
     answer = optimise(question, hooks, _kept(checkpoint), resimulate=resimulate)
-    _write_whole(files.answer, json.dumps(answer.as_json()) + "\n")
-    _write_whole(files.report, report_html(answer))
-    _write_whole(files.program, answer.program, files.encoding)
+    write_answer(answer, files)
     if checkpoint is not None:
         checkpoint.unlink(missing_ok=True)
     return answer
+
+
+def write_answer(answer: Optimised, files: Files) -> None:
+    """Write an answer into its files. Raises UsageError where one cannot be written."""
+    _write_whole(files.answer, json.dumps(answer.as_json()) + "\n")
+    _write_whole(files.report, report_html(answer))
+    _write_whole(files.program, answer.program, files.encoding)
 
 
 def _write_whole(path: Path, text: str, encoding: str = "utf-8") -> None:

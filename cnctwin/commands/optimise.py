@@ -15,10 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
