@@ -64,7 +64,7 @@ def optimise(
     """Find feed and spindle speed for each line, by time or cost, within the limits. Exit code 1: limits that cannot be kept."""
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
-        from cnctwin.batch.optimisation import Files
+        from cnctwin.batch.optimisation import Files, left_alone
         from twin.machine import read_machine
         from twin.machine_toml import machine_to_toml
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
@@ -81,7 +81,7 @@ def optimise(
         population=population,
         islands=islands,
         planned=_planned(engagement, text, described.settings),
-        left_alone={line - 1: "it was to be left alone" for line in leave or ()},
+        left_alone=left_alone(leave or ()),
         pick=pick,
         speed_changes=_speed_changes(speed_changes),
     )

@@ -22,7 +22,7 @@ from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.memory.row_numbers import holes_text, saved_holes
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
-from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.memory.store.opening import check_machine, default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
 from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.moment import length_ms, moment_ms, moment_text
@@ -110,8 +110,7 @@ def query_command(
         machine, tuple(signals), moment_ms(from_), moment_ms(to) if to else _now_ms(), length_ms(every) if every else None
     )
     with _opened(where) as store:
-        if machine not in store.machines():
-            raise UsageError(f"{machine}: the store has no such machine; it has {', '.join(store.machines()) or 'none'}")
+        check_machine(store, machine)
         columns = store.query(query)
     if as_json:
         told = [{n: getattr(c, n) for n in c.__slots__} | {"quality": [q.name.lower() for q in c.quality]} for c in columns]
