@@ -61,7 +61,8 @@ class Rows:
         """The row after an event; None where it says nothing new of this machine."""
         if event.device != self._machine or event.node.node == JOBS_NODE or event.kind not in _KINDS:
             return None
-        new = {reading.name: _signal(reading) for reading in event.read() if not reading.is_historical}
+        readings = (one for one in event.read() if not one.is_historical and not one.name.startswith(_CONTROL))
+        new = {reading.name: _signal(reading) for reading in readings}
         if not new:
             return None
         if event.kind is EventKind.BIRTH:
@@ -72,6 +73,8 @@ class Rows:
         return Row(self._machine, max(one.t for one in new.values()), MappingProxyType(signals), tuple(new))
 
 
+_CONTROL = "Device Control/"
+"""Of metrics that are written to, by which hosts command a device; they are no signals."""
 _KINDS = frozenset({EventKind.BIRTH, EventKind.DATA, EventKind.DEATH})
 
 

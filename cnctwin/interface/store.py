@@ -93,15 +93,17 @@ class Store:
         names = list(dict.fromkeys(series if signals is None else signals))
         _check(machine, names, list(series))
         told = [one for name in names for one in series[name]]
-        from_ms = min(one.first_us for one in told) // 1000 if start is None else _ms(start, "start")
-        to_ms = max(one.last_us for one in told) // 1000 + 1 if end is None else _ms(end, "end")
-        query = Query(machine, tuple(names), from_ms, to_ms, _every_ms(every))
+        held_ms = min(one.first_us for one in told) // 1000, max(one.last_us for one in told) // 1000 + 1
+        from_ms = held_ms[0] if start is None else _ms(start, "start")
+        to_ms = held_ms[1] if end is None else _ms(end, "end")
+        with one_tree():
+            query = Query(machine, tuple(names), from_ms, to_ms, _every_ms(every))
         with one_tree():
             latest = self._inner.latest(machine)
         types = {name: pa.string() if name in as_text else type_of(name, latest) for name in names}
         units = {name: next((one.unit for one in series[name] if one.unit), None) for name in names}
         schema = schema_of(types, units, windows=every is not None, details=details)
-        return pa.RecordBatchReader.from_batches(schema, self._batches(query, schema, details=details))
+        return pa.RecordBatchReader.from_batches(schema, self._batches(query, held_ms, schema, details=details))
 
     def table(
         self,
@@ -148,13 +150,13 @@ class Store:
                 series.setdefault(one.signal, []).append(one)
         return series
 
-    def _batches(self, query: Query, schema: pa.Schema, *, details: bool) -> Iterator[pa.RecordBatch]:
-        """Yield slices of time, each about as long as holds ROWS rows by the slice before it."""
+    def _batches(self, query: Query, held_ms: tuple[int, int], schema: pa.Schema, *, details: bool) -> Iterator[pa.RecordBatch]:
+        """Yield slices of the time for which there are samples, each about as long as has ROWS rows by the one before it."""
         windows, step = query.every_ms is not None, query.every_ms or 1
-        at_ms, slice_ms = query.from_ms, SLICE_MS
-        while at_ms < query.to_ms:
+        at_ms, to_ms, slice_ms = max(query.from_ms, held_ms[0]), min(query.to_ms, held_ms[1]), SLICE_MS
+        while at_ms < to_ms:
             # The end of a slice is that of a window, so that each window is asked for whole.
-            until_ms = min(-(-(at_ms + slice_ms) // step) * step, query.to_ms)
+            until_ms = min(-(-(at_ms + slice_ms) // step) * step, to_ms)
             with one_tree():
                 columns = self._inner.query(Query(query.machine, query.signals, at_ms, until_ms, query.every_ms))
             batch = batch_of(columns, schema, windows=windows, details=details)
