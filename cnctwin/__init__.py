@@ -5,8 +5,6 @@ The interface and what of it is stable: docs/python.md. All else in this package
 is kept and what stands in; the ground is files, terminal and processes.
 """
 
-from importlib import import_module
-
 TYPE_CHECKING = False  # as type checkers read it; `typing` would take longer to load than this file
 if TYPE_CHECKING:
     from cnctwin.errors import ApplicationError as ApplicationError
@@ -92,6 +90,8 @@ def __getattr__(name: str) -> object:
     place = _PLACE_OF.get(name)
     if place is None:
         raise AttributeError(f"module 'cnctwin' has no attribute {name!r}")
+    from importlib import import_module  # noqa: PLC0415
+
     from cnctwin.processes.extras import needed_by  # noqa: PLC0415
 
     with needed_by(f"cnctwin.{name}", "notebook"):
