@@ -51,7 +51,6 @@ class LimitsError(ApplicationError):
 
 
 _PUBLIC: tuple[tuple[type[Exception], type[ApplicationError]], ...] = (
-    (twin.errors.LimitsError, LimitsError),
     (twin.errors.MachineError, MachineError),
     (twin.errors.EffectError, MachineError),
     (twin.errors.RunLogError, RunError),
@@ -63,7 +62,7 @@ _EXPECTED = (twin.errors.TwinError, sparkplug.errors.SparkplugError, edge.errors
 
 @contextmanager
 def one_tree(culprit: str = "") -> Iterator[None]:
-    """Let errors of the packages below leave as errors of the interface; `culprit` is named where their text does not.
+    """Let errors of the packages below leave as errors of the interface; those of a part program name it: `culprit`.
 
     >>> with one_tree("part.nc"):
     ...     raise twin.errors.PartProgramError(3, "G123", "is not known")
@@ -74,11 +73,12 @@ def one_tree(culprit: str = "") -> Iterator[None]:
         yield
     except twin.errors.PartProgramError as error:
         raise ProgramError(_named(culprit, error), error.line, error.word) from error
+    except twin.errors.LimitsError as error:
+        raise LimitsError(_named(culprit, error)) from error
     except _EXPECTED as error:
         public = next((ours for theirs, ours in _PUBLIC if isinstance(error, theirs)), UsageError)
-        raise public(_named(culprit, error)) from error
+        raise public(str(error)) from error
 
 
 def _named(culprit: str, error: Exception) -> str:
-    text = str(error)
-    return f"{culprit}: {text}" if culprit and not text.startswith(culprit) else text
+    return f"{culprit}: {error}" if culprit else str(error)

@@ -9,7 +9,7 @@ import cnctwin
 from cnctwin.interface.errors import one_tree
 from edge.errors import ConfigError
 from sparkplug.errors import TopicError
-from twin.errors import LimitsError, RunLogError
+from twin.errors import EffectError, LimitsError, PartProgramError, RunLogError
 
 VMC = Path(__file__).parents[3] / "docs" / "notebooks" / "vmc.toml"
 
@@ -51,17 +51,20 @@ def test_without_any_broker_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("inner", "outer"),
+    ("inner", "outer", "line"),
     [
-        (RunLogError("x"), cnctwin.RunError),
-        (LimitsError("x"), cnctwin.LimitsError),
-        (TopicError("x"), cnctwin.BrokerError),
-        (ConfigError("x"), cnctwin.UsageError),
+        (RunLogError("x"), cnctwin.RunError, "x"),
+        (EffectError("x"), cnctwin.MachineError, "x"),
+        (LimitsError("x"), cnctwin.LimitsError, "part.nc: x"),
+        (PartProgramError(3, "G123", "x"), cnctwin.ProgramError, "part.nc: line 3: G123: x"),
+        (TopicError("x"), cnctwin.BrokerError, "x"),
+        (ConfigError("x"), cnctwin.UsageError, "x"),
     ],
 )
-def test_an_error_of_a_package_below_keeps_its_words_and_its_cause(inner: Exception, outer: type[Exception]) -> None:
-    with pytest.raises(outer, match=r"^part\.nc: x$") as caught, one_tree("part.nc"):
+def test_an_error_of_a_package_below_keeps_its_words_and_its_cause(inner: Exception, outer: type[Exception], line: str) -> None:
+    with pytest.raises(outer) as caught, one_tree("part.nc"):
         raise inner
+    assert str(caught.value) == line
     assert caught.value.__cause__ is inner
 
 

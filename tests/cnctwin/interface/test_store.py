@@ -28,6 +28,7 @@ def where(tmp_path: Path) -> Path:
         reading("coolant_on", True, 0),
         reading("spindle_rpm", None, 0, BAD, "not known yet"),
         reading("odd", 1, 0),
+        reading("feed_mm_min", 100.0, 0),
     ]
     writing.append([told(first, 0, kind=EventKind.BIRTH), *steady(100, 600)])
     last = [
@@ -35,6 +36,7 @@ def where(tmp_path: Path) -> Path:
         reading("spindle_rpm", 901.0, 60_600, STALE, "gone"),
         reading("odd", "two", 60_600),
     ]
+    last.append(reading("feed_mm_min", "fast", 60_600))
     writing.append([told(last, 60_600)])
     writing.close()
     return tmp_path
@@ -49,7 +51,7 @@ def store(where: Path) -> Iterator[cnctwin.Store]:
 def test_machines_and_signals_say_what_there_is(store: cnctwin.Store) -> None:
     assert store.machines() == ["vmc"]
     by_name = {signal.name: signal for signal in store.signals("vmc")}
-    assert list(by_name) == ["coolant_on", "exec_state", "odd", "spindle_rpm", "twin_like", "x_mm"]
+    assert list(by_name) == ["coolant_on", "exec_state", "feed_mm_min", "odd", "spindle_rpm", "twin_like", "x_mm"]
     x = by_name["x_mm"]
     assert (x.unit, x.nodes, x.first, x.last) == ("mm", ("cnc/edge-1",), T0, T0 + timedelta(milliseconds=60_000))
 
@@ -111,8 +113,10 @@ def test_a_frame_is_by_time_and_knows_its_units(store: cnctwin.Store) -> None:
 
 def test_a_signal_that_told_a_number_and_a_text_is_named_and_can_be_read_as_text(store: cnctwin.Store) -> None:
     assert store.table("vmc", ["odd"]).column("odd").to_pylist() == ["1", "two"]  # it told a text last
-    with pytest.raises(cnctwin.StoreError, match=r"odd: is 'two' at .*, which is no double; read it with as_text=\['odd'\]"):
-        batch_of([column("odd", [0], ["two"])], schema_of({"odd": type_of("odd", {})}, {}, windows=False, details=False), **PLAIN)
+    fault = r"feed_mm_min: is 'fast' at 2026-.*, which is no double; read it with as_text=\['feed_mm_min'\]"
+    with pytest.raises(cnctwin.StoreError, match=fault):
+        store.table("vmc", ["feed_mm_min"])
+    assert store.table("vmc", ["feed_mm_min"], as_text=["feed_mm_min"]).column("feed_mm_min").to_pylist() == ["100.0", "fast"]
 
 
 @pytest.mark.parametrize(
