@@ -85,19 +85,21 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    """Load a public name. Raises MissingPackageError where what it needs is not installed."""
-    place = _PLACE_OF.get(name)
-    if place is None:
-        raise AttributeError(f"module 'cnctwin' has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
+if not TYPE_CHECKING:  # who would otherwise believe every name
 
-    from cnctwin.processes.extras import needed_by  # noqa: PLC0415
+    def __getattr__(name: str) -> object:
+        """Load a public name. Raises MissingPackageError where what it needs is not installed."""
+        place = _PLACE_OF.get(name)
+        if place is None:
+            raise AttributeError(f"module 'cnctwin' has no attribute {name!r}")
+        from importlib import import_module  # noqa: PLC0415
 
-    with needed_by(f"cnctwin.{name}", "notebook"):
-        found = getattr(import_module(place), name)
-    globals()[name] = found
-    return found
+        from cnctwin.processes.extras import needed_by  # noqa: PLC0415
+
+        with needed_by(f"cnctwin.{name}", "notebook"):
+            found = getattr(import_module(place), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

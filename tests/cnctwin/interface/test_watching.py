@@ -76,6 +76,19 @@ def test_a_loop_sees_every_change_in_order(url: str, machine: Machine) -> None:
         assert counts["received"] == counts["emitted"] and counts["dropped"] == counts["buffered"] == counts["lost"] == 0
 
 
+def test_while_the_broker_is_away_the_row_is_stale_and_then_it_goes_on(mosquitto: Mosquitto, url: str, machine: Machine) -> None:
+    with cnctwin.watch(url, "vmc", patience_s=PATIENCE_S) as watch:
+        first_row(watch, machine)
+        machine.tell(1)
+        mosquitto.kill()
+        stale = next(row for row in watch if row["part_count"].quality == "stale")
+        assert stale.values() == {"part_count": None}
+        assert watch.trouble
+        mosquitto.restart()
+        good = next(row for row in watch if row["part_count"].quality == "good")
+        assert good["part_count"].value == machine.count
+
+
 def test_a_reader_that_is_too_slow_loses_the_oldest_rows_and_is_told_how_many(url: str, machine: Machine) -> None:
     with cnctwin.watch(url, "vmc", queue_max=5) as watch:
         first_row(watch, machine)
