@@ -2,6 +2,7 @@
 
 ApplicationError
 ├── UsageError         wrong input: exit code 2
+│   └── MissingPackageError  a package that this installation lacks (an ImportError, too)
 ├── BrokerStartError   the private broker cannot be started
 └── SpreadError        pieces of a job that are lost: nobody is there to compute them, or each who tried was killed
 """
@@ -13,6 +14,10 @@ class ApplicationError(Exception):
 
 class UsageError(ApplicationError):
     """Input that cannot be used, with the way out."""
+
+
+class MissingPackageError(UsageError, ImportError):
+    """A package that this installation lacks, with the extra that brings it."""
 
 
 class BrokerStartError(ApplicationError):

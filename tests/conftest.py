@@ -44,6 +44,7 @@ LONG = (
     "cnctwin/test_kill_and_restart.py",
     "twin/identification/test_identify.py",
     "cnctwin/demo/test_demo.py",
+    "cnctwin/interface/test_notebooks.py",
     "twin/gap/test_diagnose.py",
     "processors/alerts/courier/test_courier_on_a_broker.py",
     "twin/gap/programs/test_diagnose.py",

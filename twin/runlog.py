@@ -130,12 +130,17 @@ def read_run(path: Path) -> RunLog:
     return replace(log, ignored=tuple(name for name in names if name not in numbers and name not in TEXT_COLUMNS))
 
 
-def write_run(run: RunLog, path: Path) -> None:
-    """Writes a run log as Parquet, or as CSV where the path ends so; NaN becomes null."""
+def run_table(run: RunLog) -> pa.Table:
+    """Return a run log as a table with the columns of its file; NaN is null."""
     arrays = {"t_s": pa.array(run.t_s)}
     arrays |= {outside_names(name, run.rotary): pa.array(values, from_pandas=True) for name, values in run.columns.items()}
     arrays |= {name: pa.array(list(values), type=pa.string()) for name, values in run.text.items()}
-    table = pa.table(arrays)
+    return pa.table(arrays)
+
+
+def write_run(run: RunLog, path: Path) -> None:
+    """Writes a run log as Parquet, or as CSV where the path ends so; NaN becomes null."""
+    table = run_table(run)
     if path.suffix == ".csv":
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)

@@ -1,9 +1,9 @@
-"""Runs an optimisation and writes its files: for the command line, and for a job."""
+"""Runs an optimisation and writes its files: for the command line, for a job, and for Python."""
 
 import json
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -103,14 +103,29 @@ def run(
         if checkpoint is not None:
             _write_whole(checkpoint, text)
 
-    hooks = Hooks(spread=spread, progress=progress, save=save, stop=stop, clock=time.monotonic)
-    answer = optimise(question, hooks, _kept(checkpoint), resimulate=resimulate)
-    _write_whole(files.answer, json.dumps(answer.as_json()) + "\n")
-    _write_whole(files.report, report_html(answer))
-    _write_whole(files.program, answer.program, files.encoding)
+    hooks = Hooks(spread=spread, progress=progress, save=save, stop=stop)
+    answer = answer_to(question, hooks, _kept(checkpoint), resimulate=resimulate)
+    write_answer(answer, files)
     if checkpoint is not None:
         checkpoint.unlink(missing_ok=True)
     return answer
+
+
+def answer_to(question: Question, hooks: Hooks, checkpoint: str | None = None, *, resimulate: bool = True) -> Optimised:
+    """The answer to a question, with the time that it took. Raises as `optimise_request`."""
+    return optimise(question, replace(hooks, clock=time.monotonic), checkpoint, resimulate=resimulate)
+
+
+def left_alone(lines: Iterable[int]) -> dict[int, str]:
+    """Return lines (from 1) that may not be changed as a `Question` has them."""
+    return {line - 1: "it was to be left alone" for line in lines}
+
+
+def write_answer(answer: Optimised, files: Files) -> None:
+    """Write an answer into its files. Raises UsageError where one cannot be written."""
+    _write_whole(files.answer, json.dumps(answer.as_json()) + "\n")
+    _write_whole(files.report, report_html(answer))
+    _write_whole(files.program, answer.program, files.encoding)
 
 
 def _write_whole(path: Path, text: str, encoding: str = "utf-8") -> None:

@@ -33,8 +33,8 @@ def bridge(
     ] = 0.0,
 ) -> None:
     """Write what machines send to Kafka, and publish what processors on Kafka compute (docs/kafka.md)."""
-    from cnctwin.commands.extras import needed_by
     from cnctwin.kafka.settings import settings_of
+    from cnctwin.processes.extras import needed_by
 
     with needed_by("cnctwin bridge", "kafka"):
         import confluent_kafka  # noqa: F401

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
+from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
 

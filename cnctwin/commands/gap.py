@@ -5,7 +5,6 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,11 +13,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.gap_case import case
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
-from cnctwin.files.output import write
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
@@ -39,16 +37,14 @@ def diagnose(
 ) -> None:
     """Say where the gap lies, what causes it, how far it shrinks. Exit code 1: a gap without a name is left."""
     with needed_by("the twin", "twin"):
-        from cnctwin.batch.diagnosis import diagnosis_files, in_threads
+        from cnctwin.batch.diagnosis import diagnosis_files, in_threads, write_files
         from twin.case import read_case
         from twin.gap.diagnosis import Verdict
     recorded = read_case(case)
     with working("diagnosing") as say:
         found = in_threads(recorded, lambda what: say(f"diagnosing: {what}"))
     files = diagnosis_files(found, recorded.name)
-    write(lambda: out.mkdir(parents=True, exist_ok=True), out)
-    for name, text in files.items():
-        write(partial((out / name).write_text, text, encoding="utf-8"), out / name)
+    write_files(files, out)
     if as_json:
         sys.stdout.write(found.diagnosis.to_json())
     else:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms, moment_text
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
+from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import moment_ms, moment_text
 from cnctwin.terminal.spinner import working
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.gap_case import Ambient, From, Machine, MachineFile, To, composed_of
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.output import write
+from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
 

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import moment_ms
 from cnctwin.terminal.spinner import working
 
 

@@ -15,7 +15,6 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from cnctwin.commands.moment import moment_text
 from cnctwin.commands.options import AsJson, Broker, Group, Wait
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded, read_text
@@ -27,6 +26,7 @@ from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.look_around import refuse_second
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import moment_text
 from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress

@@ -10,13 +10,13 @@ from typing import Annotated, Any
 
 import typer
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import TIME, moment_ms
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import DIGITS, faults_of
+from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import TIME, moment_ms
 from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 

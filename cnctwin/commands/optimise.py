@@ -15,10 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def optimise(
     """Find feed and spindle speed for each line, by time or cost, within the limits. Exit code 1: limits that cannot be kept."""
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
-        from cnctwin.batch.optimisation import Files
+        from cnctwin.batch.optimisation import Files, left_alone
         from twin.machine import read_machine
         from twin.machine_toml import machine_to_toml
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
@@ -81,7 +81,7 @@ def optimise(
         population=population,
         islands=islands,
         planned=_planned(engagement, text, described.settings),
-        left_alone={line - 1: "it was to be left alone" for line in leave or ()},
+        left_alone=left_alone(leave or ()),
         pick=pick,
         speed_changes=_speed_changes(speed_changes),
     )

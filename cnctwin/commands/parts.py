@@ -12,13 +12,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.moment import moment_ms
 from cnctwin.commands.options import StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.memory.parts.journal import Journal
 from cnctwin.memory.parts.record_log import parts
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.processes.stopping import stopped_by_signals
+from cnctwin.terminal.moment import moment_ms
 from edge.state_dir import state_dir as folder_for_state
 from processors.alerts.courier.secret import read_secret
 from processors.alerts.receivers import names_secret, url_fault

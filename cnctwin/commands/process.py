@@ -59,8 +59,8 @@ def _over_kafka(
     member: str,
 ) -> None:
     """Run processors as the members of a consumer group; only the courier of alerts needs a broker."""
-    from cnctwin.commands.extras import needed_by
     from cnctwin.kafka.settings import settings_of
+    from cnctwin.processes.extras import needed_by
 
     with needed_by("cnctwin process --kafka", "kafka"):
         from cnctwin.kafka.claim import claim

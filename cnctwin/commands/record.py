@@ -10,9 +10,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.table import text_table

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from cnctwin.commands.moment import moment_ms
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.memory.replay import replay
 from cnctwin.memory.replay.report import shown
 from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.terminal.moment import moment_ms
 from processors.config import read_tables
 
 

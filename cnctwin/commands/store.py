@@ -18,21 +18,20 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms, moment_text
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.memory.row_numbers import holes_text, saved_holes
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
-from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.memory.store.opening import check_machine, default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
+from cnctwin.processes.extras import needed_by
+from cnctwin.terminal.moment import length_ms, moment_ms, moment_text
 
 store_app = typer.Typer(no_args_is_help=True, help="The store: what it holds, what it costs, a stretch of it.")
 
 Machine = Annotated[str, typer.Argument(help="Name of the machine")]
 From = Annotated[str, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), ms since 1970, or -15m")]
 To = Annotated[str, typer.Option("--to", help="The same; now where it is left out")]
-_SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
 _BYTES = re.compile(r"(\d+(?:\.\d+)?)\s*([kMGT]?)B?", re.IGNORECASE)
 _POWERS = {"": 0, "k": 1, "m": 2, "g": 3, "t": 4}
 
@@ -107,10 +106,11 @@ def query_command(
     as_json: AsJson = False,
 ) -> None:
     """Print samples or windows as CSV, or JSON."""
-    query = Query(machine, tuple(signals), moment_ms(from_), moment_ms(to) if to else _now_ms(), _every_ms(every))
+    query = Query(
+        machine, tuple(signals), moment_ms(from_), moment_ms(to) if to else _now_ms(), length_ms(every) if every else None
+    )
     with _opened(where) as store:
-        if machine not in store.machines():
-            raise UsageError(f"{machine}: the store has no such machine; it has {', '.join(store.machines()) or 'none'}")
+        check_machine(store, machine)
         columns = store.query(query)
     if as_json:
         told = [{n: getattr(c, n) for n in c.__slots__} | {"quality": [q.name.lower() for q in c.quality]} for c in columns]
@@ -137,7 +137,8 @@ def export_command(
     """Write a stretch of a machine as a run log, which gap diagnosis, identification and training read."""
     with needed_by("a run log", "twin"):
         from cnctwin.memory.store.run_export import export
-    rows = export(where or default_place(), machine, (moment_ms(from_), moment_ms(to)), out, every_ms=_every_ms(every), held=held)
+    span_ms, every_ms = (moment_ms(from_), moment_ms(to)), length_ms(every) if every else None
+    rows = export(where or default_place(), machine, span_ms, out, every_ms=every_ms, held=held)
     sys.stdout.write(f"{rows} rows in {out}\n")
 
 
@@ -198,15 +199,6 @@ def _opened(where: str | None) -> _Opened:
 
 def _now_ms() -> int:
     return time.time_ns() // 1_000_000
-
-
-def _every_ms(text: str | None) -> int | None:
-    if text is None:
-        return None
-    match = re.fullmatch(r"(\d+)(ms|s|m|h|d)", text)
-    if match is None:
-        raise UsageError(f"--every {text!r}: write 100ms, 1s, 1m, 1h or 1d")
-    return int(match[1]) * (1 if match[2] == "ms" else _SECONDS[match[2]] * 1000)
 
 
 def _bytes(text: str) -> int:

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_text
 from cnctwin.commands.options import AsJson, Broker, Group, Machines, StorePlace, Wait
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import moment_text
 
 if TYPE_CHECKING:
     from cnctwin.machines.change import Change, Done

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import TIME, moment_ms
 from cnctwin.commands.options import AsJson, Group
 from cnctwin.errors import UsageError
 from cnctwin.machines.folder import MachineFolder
 from cnctwin.machines.place import machines_folder
+from cnctwin.processes.extras import needed_by
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import TIME, moment_ms
 from edge.state_dir import state_dir
 from twin.vocabulary.nodes import VALIDATION_NODE
 

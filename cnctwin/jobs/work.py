@@ -99,13 +99,12 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
 
 def diagnose(parameters: "CaseParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin gap diagnose`: diagnosis.json, report.html, twin.toml."""
-    from cnctwin.batch.diagnosis import diagnosis_files, in_threads  # noqa: PLC0415  with all of the twin
+    from cnctwin.batch.diagnosis import diagnosis_files, in_threads, write_files  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
 
     case = read_case(bench.files.case(parameters.case, "case")[0])
     found = in_threads(case, bench.steps())
-    for name, text in diagnosis_files(found, case.name).items():
-        (bench.out / name).write_text(text, encoding="utf-8")
+    write_files(diagnosis_files(found, case.name), bench.out)
     told = found.diagnosis
     causes = [f"{cause.effect} on {cause.on}" for cause in told.causes[:10]]
     gap = {"before": told.gap.before, "after": told.gap.after}

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from cnctwin.commands.moment import moment_ms
 from cnctwin.errors import UsageError
+from cnctwin.terminal.moment import moment_ms
 
 
 def train_residual(

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Store, StoreError
 from cnctwin.memory.store.retention import Retention
 from edge.state_dir import state_dir
@@ -32,3 +33,9 @@ def open_store(where: str | Path, *, writable: bool = False, retention: Retentio
     from cnctwin.memory.store.embedded import EmbeddedStore  # noqa: PLC0415
 
     return EmbeddedStore(Path(where), writable=writable, retention=retention)
+
+
+def check_machine(store: Store, machine: str) -> None:
+    """Raises UsageError, with the machines there are, where the store has none of this name."""
+    if machine not in (known := store.machines()):
+        raise UsageError(f"{machine}: the store has no such machine; it has {', '.join(known) or 'none'}")

@@ -1,4 +1,4 @@
-"""A moment as people write it on the command line, and as a table shows it."""
+"""A moment and a length of time as people write them, on the command line or in Python, and a moment as a table shows it."""
 
 import re
 import time
@@ -9,6 +9,7 @@ from cnctwin.errors import UsageError
 FORMS = "2026-11-22T06:00 (UTC where no zone stands), ms since 1970, or -15m for a quarter of an hour ago (s, m, h, d)"
 TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
 _AGO = re.compile(r"-(\d+(?:\.\d+)?)([smhd])")
+_LENGTH = re.compile(r"(\d+)(ms|s|m|h|d)")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 
@@ -30,6 +31,18 @@ def moment_ms(text: str, option: str = "", now_ms: int | None = None) -> int:
     except ValueError:
         raise UsageError(f"{f'{option} ' if option else ''}{text!r} is no moment; write {FORMS}") from None
     return round((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp() * 1000)
+
+
+def length_ms(text: str, option: str = "--every") -> int:
+    """A length of time in ms; `option` is named where it is none. Raises UsageError.
+
+    >>> length_ms("100ms"), length_ms("1s"), length_ms("15m")
+    (100, 1000, 900000)
+    """
+    match = _LENGTH.fullmatch(text)
+    if match is None:
+        raise UsageError(f"{option} {text!r}: write 100ms, 1s, 1m, 1h or 1d")
+    return int(match[1]) * (1 if match[2] == "ms" else round(_SECONDS[match[2]] * 1000))
 
 
 def moment_text(at_ms: float) -> str:
