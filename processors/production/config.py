@@ -20,7 +20,6 @@ class Config(ProcessorConfig):
 
     of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"ideal_s", "cycle_s_min", "modes", "feed_mm_min_min"})
 
-    tick_s: float = Field(default=5.0, ge=0.001, le=60.0, description="a tick at each multiple of this")
     calendar: str = ""
     expectations: str = ""
     ideal_s: dict[str, PositiveFloat] = Field(default_factory=dict, max_length=5000)

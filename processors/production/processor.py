@@ -14,13 +14,14 @@ from processors.events.execution import ALARM, CHANGING, EXECUTION, FEED, FEED_O
 from processors.events.processor import PART, WATCHED
 from processors.events.processor import State as Runs
 from processors.events.processor import step as runs_step
+from processors.production.calendar import Slot
 from processors.production.config import Config
 from processors.production.doing import UNKNOWN, Doing, doing
 from processors.production.given import Given, given, read_files
 from processors.production.ratios import ratios
 from processors.production.record import part_record, shift_record, sums_of
-from processors.production.state import Energy, LastPart, State
-from processors.production.tally import Tally, opened, spent, unseen, with_energy, with_part, with_quality
+from processors.production.state import Energy, LastPart, Pending, State
+from processors.production.tally import Tally, opened, spent, with_part, with_quality
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
@@ -46,7 +47,7 @@ POWER_KW_MAX = 1e4
 NO_POWER = "spindle_power_kw is not known, nor the load and rated power of the spindle"
 GOOD, SCRAP = "GOOD", "SCRAP"
 _HOLE, _DATA, _TICK, _BIRTH = SampleKind.HOLE, SampleKind.DATA, SampleKind.TICK, SampleKind.BIRTH
-_WAKES = WATCHED | {FEED, POWER, LOAD, PART_QUALITY}
+_WAKES = WATCHED | {PART_QUALITY}
 
 
 def step(means: Given, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
@@ -58,21 +59,23 @@ def step(means: Given, state: State, sample: Sample) -> tuple[State, Sequence[Ou
     state = _lasted(means, config, state, sample, outputs)
     before = state.runs
     runs, said = runs_step(config.runs, before, sample)
-    state = replace(state, runs=runs, is_blind=sample.kind is _HOLE and sample.gap_s > 0.0)
-    ended = next((one.value for one in said if one.name == PART), None)
-    if isinstance(ended, str) and before.run is not None:
-        state = _with_part(means, state, sample, json.loads(ended), before.run.began_ms, outputs)
+    state = state.with_runs(runs, sample.kind is _HOLE and sample.gap_s > 0.0)
     if _is_another_run(before, runs):
+        ended = next((one.value for one in said if one.name == PART), None)
+        state = settled(state)
+        if isinstance(ended, str) and before.run is not None:
+            state = _with_part(means, state, sample, json.loads(ended), before.run.began_ms, outputs)
         state = replace(state, energy=Energy())
     if sample.kind is _DATA and PART_QUALITY in sample.changed:
         state = _with_quality(state, sample, outputs)
     now = UNKNOWN if state.is_blind else doing(runs, sample, config.modes)
-    if now != (state.kind, state.reason):
-        state = replace(state, kind=now.kind, reason=now.reason, is_new=True)
+    if now.kind is not state.kind or now.reason != state.reason:
+        state = replace(settled(state), kind=now.kind, reason=now.reason, is_new=True)
     is_due = sample.kind in (_TICK, _BIRTH) and not 0.0 <= sample.at_s - state.told_s < config.told_s
-    if state.tally is not None and (outputs or is_due):
-        outputs += _figures(state.tally, sample.machine, config.known_share_min)
-        state = replace(state, told_s=sample.at_s)
+    if is_due or outputs:
+        state = replace(settled(state), told_s=sample.at_s)
+        if state.tally is not None:
+            outputs += _figures(state.tally, sample.machine, config.known_share_min)
     return state, outputs
 
 
@@ -82,55 +85,70 @@ def _is_another_run(before: Runs, now: Runs) -> bool:
     return before.run.began_ms != now.run.began_ms
 
 
-def _lasted(means: Given, config: Config, state: State, sample: Sample, outputs: list[Output]) -> State:
-    """The state with the time since it was last looked at, spent as the machine then did, split at the borders of shifts."""
-    before_s, at_s, kw = state.at_s, sample.at_s, _power_kw(means, sample)
-    if before_s is None or at_s < before_s:
-        return replace(state, at_s=at_s, kw=kw, tally=_tally_at(means, config, state.tally, sample.machine, at_s, outputs))
-    if at_s == before_s:
-        return state if kw == state.kw else replace(state, kw=kw)
-    was = UNKNOWN if state.is_blind else Doing(state.kind, state.reason)
-    mean_kw = None if kw is None or state.kw is None or state.is_blind else 0.5 * (kw + state.kw)
-    tally, is_new = state.tally, state.is_new
-    for _ in range(SLOTS_MAX):
-        slot = means.slot(sample.machine, before_s)
-        if tally is None or not tally.is_of(slot):
-            tally = _tally_at(means, config, tally, sample.machine, before_s, outputs)
-        until_s = min(at_s, slot.until_s)
-        tally = spent(tally, slot, was, until_s - before_s, is_new=is_new)
-        if mean_kw is not None:
-            tally = with_energy(tally, mean_kw, until_s - before_s)
-        before_s, is_new = until_s, False
-        if before_s >= at_s:
-            break
+def settled(state: State) -> State:
+    """Return the state with all time that has passed in its tally, and in the energy of its run."""
+    pending, tally, energy = state.pending, state.tally, state.energy
+    if pending.seconds <= 0.0 or tally is None:
+        return state
+    slot = Slot(tally.shift, tally.begin_s, tally.end_s, pending.until_s, pending.is_planned)
+    tally = spent(tally, slot, Doing(state.kind, state.reason), pending.seconds, is_new=state.is_new)
+    if pending.known_s > 0.0:
+        tally = replace(tally, energy_kwh=tally.energy_kwh + pending.kwh, energy_s=tally.energy_s + pending.known_s)
+    energy = Energy(energy.kwh + pending.kwh, energy.known_s + pending.known_s, energy.seconds + pending.seconds)
     return replace(
-        state,
-        at_s=at_s,
-        kw=kw,
-        tally=tally,
-        is_new=False,
-        energy=_spent_energy(state.energy, mean_kw, at_s - (state.at_s or at_s)),
+        state, tally=tally, energy=energy, is_new=False, pending=Pending(pending.until_s, is_planned=pending.is_planned)
     )
 
 
-def _tally_at(  # noqa: PLR0917
-    means: Given, config: Config, tally: Tally | None, machine: str, at_s: float, outputs: list[Output]
-) -> Tally:
-    """Return the tally of the shift that holds a moment: the present one, or a new one, and then the record of the present."""
-    slot = means.slot(machine, at_s)
-    if tally is not None:
-        if tally.is_of(slot):
-            return tally
-        if not tally.is_empty:
+def _lasted(means: Given, config: Config, state: State, sample: Sample, outputs: list[Output]) -> State:
+    """The state with the time since it was last looked at, spent as the machine then did, split at the borders of shifts."""
+    before_s, at_s, kw, pending = state.at_s, sample.at_s, _power_kw(means, sample), state.pending
+    if before_s is None or at_s < before_s:
+        return _joined(means, config, replace(settled(state), at_s=at_s, kw=kw), sample.machine, outputs)
+    if at_s == before_s:
+        return state if kw == state.kw else state.having(at_s, kw, pending)
+    if state.is_blind:
+        state = replace(settled(state), kind=UNKNOWN.kind, reason=UNKNOWN.reason, is_new=state.kind is not UNKNOWN.kind)
+    mean_kw = None if kw is None or state.kw is None or state.is_blind else 0.5 * (kw + state.kw)
+    for _ in range(SLOTS_MAX):
+        until_s = min(at_s, state.pending.until_s)
+        state = state.having(until_s, kw, _longer(state.pending, until_s - before_s, mean_kw))
+        if until_s >= at_s:
+            return state
+        before_s = until_s
+        state = _joined(means, config, settled(state), sample.machine, outputs)
+    return _joined(means, config, replace(settled(state), at_s=at_s), sample.machine, outputs)
+
+
+def _longer(pending: Pending, seconds: float, mean_kw: float | None) -> Pending:
+    until_s, is_planned = pending.until_s, pending.is_planned
+    if mean_kw is None:
+        return Pending(until_s, is_planned, pending.seconds + seconds, pending.kwh, pending.known_s)
+    kwh = pending.kwh + mean_kw * seconds / 3600.0
+    return Pending(until_s, is_planned, pending.seconds + seconds, kwh, pending.known_s + seconds)
+
+
+def _joined(means: Given, config: Config, state: State, machine: str, outputs: list[Output]) -> State:
+    """Return a state in which all time is settled, in the slot that holds its moment; a shift that is over is told."""
+    assert state.at_s is not None, "there is a moment"
+    slot = means.slot(machine, state.at_s)
+    tally = state.tally
+    if tally is None or not tally.is_of(slot):
+        if tally is not None and not tally.is_empty:
             record = shift_record(machine, tally, config.known_share_min, is_over=True)
-            outputs.append(Output(PRODUCTION, record, at_s=min(tally.end_s, at_s)))
-    has_calendar = means.calendar is not None
-    tally = opened(slot, at_s, has_calendar=has_calendar)
+            outputs.append(Output(PRODUCTION, record, at_s=min(tally.end_s, state.at_s)))
+        tally = _opened(means, machine, slot, state.at_s)
+    return replace(state, tally=tally, pending=Pending(slot.until_s, is_planned=slot.is_planned))
+
+
+def _opened(means: Given, machine: str, slot: Slot, at_s: float) -> Tally:
+    """Return the tally of a shift that is joined now; its planned time before that is unknown."""
+    tally = opened(slot, at_s, has_calendar=means.calendar is not None)
     seen_s = slot.begin_s
-    while has_calendar and seen_s < at_s:  # of the shift before anybody looked
+    while tally.has_calendar and seen_s < at_s:
         part = means.slot(machine, seen_s)
         until_s = min(at_s, part.until_s)
-        tally = unseen(tally, part, until_s - seen_s)
+        tally = spent(tally, part, UNKNOWN, until_s - seen_s, is_new=False)
         seen_s = until_s
     return tally
 
@@ -142,12 +160,6 @@ def _power_kw(means: Given, sample: Sample) -> float | None:
         load_pct, _ = sample.number(LOAD)
         kw = None if load_pct is None else 0.01 * load_pct * means.rated_kw
     return kw if kw is not None and abs(kw) <= POWER_KW_MAX else None
-
-
-def _spent_energy(energy: Energy, mean_kw: float | None, seconds: float) -> Energy:
-    if mean_kw is None:
-        return replace(energy, seconds=energy.seconds + seconds)
-    return Energy(energy.kwh + mean_kw * seconds / 3600.0, energy.known_s + seconds, energy.seconds + seconds)
 
 
 def _with_part(  # noqa: PLR0917

@@ -41,6 +41,17 @@ class LastPart:
 
 
 @dataclass(frozen=True, slots=True)
+class Pending:
+    """Time that is not in the tally yet: spent in one way, in one slot of the calendar, which ends at until_s."""
+
+    until_s: float = 0.0
+    is_planned: bool = False
+    seconds: float = 0.0
+    kwh: float = 0.0
+    known_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class State:
     """See the module.
 
@@ -57,6 +68,21 @@ class State:
     kw: float | None = None
     is_blind: bool = False
     tally: Tally | None = None
+    pending: Pending = field(default_factory=Pending)
     energy: Energy = field(default_factory=Energy)
     part: LastPart | None = None
     told_s: float = 0.0
+
+    def having(self, at_s: float, kw: float | None, pending: Pending) -> "State":
+        """Return the state with these. Spelled out, since `replace` looks up each field, and there is one a second."""
+        return State(
+            self.runs, at_s, self.kind, self.reason, self.is_new, kw, self.is_blind,
+            self.tally, pending, self.energy, self.part, self.told_s,
+        )  # fmt: skip
+
+    def with_runs(self, runs: Runs, is_blind: bool) -> "State":
+        """Return the state with these; spelled out as `having`."""
+        return State(
+            runs, self.at_s, self.kind, self.reason, self.is_new, self.kw, is_blind,
+            self.tally, self.pending, self.energy, self.part, self.told_s,
+        )  # fmt: skip

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from processors.production.calendar import Slot
-from processors.production.doing import NO_DATA, Doing, Kind
+from processors.production.doing import Doing, Kind
 
 REASONS_MAX, REASON_MAX = 24, 80
 OTHER = "other"
@@ -93,20 +93,6 @@ def spent(tally: Tally, slot: Slot, doing: Doing, seconds: float, *, is_new: boo
     if doing.kind is Kind.PRODUCTION:
         return replace(tally, **added)  # type: ignore[arg-type]  # floats only
     return replace(tally, stops=_with_stop(tally.stops, doing, seconds, is_new), **added)  # type: ignore[arg-type]
-
-
-def unseen(tally: Tally, slot: Slot, seconds: float) -> Tally:
-    """Return the tally with planned time that nobody looked at."""
-    return spent(tally, slot, Doing(Kind.UNKNOWN, NO_DATA), seconds, is_new=False)
-
-
-def with_energy(tally: Tally, mean_kw: float, seconds: float) -> Tally:
-    """Return the tally with energy: a mean power for some seconds.
-
-    >>> with_energy(Tally(None, 0.0, 0.0, 0.0, False), 6.0, 1800.0).energy_kwh
-    3.0
-    """
-    return replace(tally, energy_kwh=tally.energy_kwh + mean_kw * seconds / 3600.0, energy_s=tally.energy_s + seconds)
 
 
 def with_part(tally: Tally, *, active_s: float | None, ideal_s: float | None) -> Tally:

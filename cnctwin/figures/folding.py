@@ -1,0 +1,136 @@
+"""The fold of `production` over a store: the same engine, given each message as it was received.
+
+What held when the stretch began is the last sample of each signal before it. Time in which the memory itself heard nothing (its
+process was away) is unknown: the machine is taken to be offline from the last message on until its next birth.
+"""
+
+from collections import deque
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
+
+from cnctwin.memory.descriptions import Described, described
+from cnctwin.memory.store.contract import Query, Store
+from processors.actions import Action, Publish
+from processors.config import Configuration
+from processors.description import Role
+from processors.production.config import Config
+from processors.production.given import Given
+from processors.production.processor import PROCESSOR, settled
+from processors.production.record import shift_record
+from processors.running.engine import Engine
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import NodeId, Reading
+from sparkplug.quality import Quality
+from twin.vocabulary.nodes import HISTORIAN_NODE, is_twin_node
+from twin.vocabulary.twin_signals import PRODUCTION
+
+DAY_MS = 86_400_000
+POLL_S = 0.025  # a worker looks for silence every 50 ms
+NOT_KNOWN = "not known when the stretch began"
+
+
+def folded(store: Store, machine: str, from_ms: int, to_ms: int, table: Mapping[str, Any] | None = None) -> list[str]:
+    """Return the records of a machine's shifts and parts in [from_ms, to_ms), that of the last shift as far as it has come.
+
+    The fold begins with the shift that holds `from_ms`. table: the configuration of `production`. Raises StoreError,
+    ConfigurationError.
+    """
+    configuration = PROCESSOR.configured(table)
+    begin_ms = round(1000 * Given(configuration).slot(machine, from_ms / 1000).begin_s)
+    return _Folding(store, machine, max(begin_ms, 0), to_ms, configuration).records()
+
+
+class _Folding:
+    """One run over the log of one machine."""
+
+    def __init__(self, store: Store, machine: str, from_ms: int, to_ms: int, configuration: Configuration[Config]) -> None:
+        self._store, self._machine, self._from_ms, self._to_ms = store, machine, from_ms, to_ms
+        self._configuration = configuration
+        self._engine = Engine(PROCESSOR, configuration)
+        self._alive: dict[NodeId, None] = {}
+        self._heard_ms = from_ms
+        self._descriptions = deque(
+            one for one in described(store, machine, from_ms, to_ms) if one.role is Role.LIVE and one.message is not None
+        )
+        self._told: list[str] = []
+
+    def records(self) -> list[str]:
+        """Run, and return what came of it."""
+        self._describe(self._from_ms)
+        for event in _births_before(self._store, self._machine, self._from_ms):
+            self._feed(self._from_ms, event)
+        last_ms = self._from_ms
+        for received_ms, event in self._store.messages(self._machine, self._from_ms, self._to_ms):
+            self._describe(received_ms)
+            last_ms = received_ms
+            if event.node.node == HISTORIAN_NODE:
+                if event.kind is EventKind.HOLE:
+                    self._bury()
+            elif not is_twin_node(event.node.node):
+                self._silence(received_ms)
+                self._feed(received_ms, event)
+        if last_ms < self._to_ms:
+            self._silence(last_ms)  # what came after the last message nobody can tell
+        lane = self._engine.lane_of(self._machine)
+        tally = None if lane is None else settled(lane.state).tally
+        if tally is not None and not tally.is_empty:
+            share = self._configuration.default.known_share_min
+            self._told.append(shift_record(self._machine, tally, share, is_over=False))
+        return self._told
+
+    def _describe(self, at_ms: int) -> None:
+        while self._descriptions and self._descriptions[0].received_ms <= at_ms:
+            one: Described = self._descriptions.popleft()
+            self._took(self._engine.describe(self._machine, Role.LIVE, one.description))
+
+    def _feed(self, received_ms: int, event: HostEvent) -> None:
+        if event.kind is EventKind.BIRTH:
+            self._alive[event.node] = None
+        elif event.kind is EventKind.DEATH:
+            self._alive.pop(event.node, None)
+        elif event.kind is EventKind.DATA and event.node not in self._alive:
+            names = [one.signal for one in self._store.series(self._machine) if one.node == event.node.node]
+            nulls = tuple(Reading(name, None, event.timestamp_ms, Quality.BAD, None, NOT_KNOWN, False) for name in names)
+            self._feed(received_ms, event._replace(kind=EventKind.BIRTH, readings=nulls, names=()))
+        self._heard_ms = received_ms
+        self._took(self._engine.feed(event, received_ms / 1000))
+
+    def _bury(self) -> None:
+        """The memory was away: nobody knows how the machine was meanwhile."""
+        for node in tuple(self._alive):
+            self._feed(self._heard_ms, HostEvent(EventKind.DEATH, node, self._machine, self._heard_ms, (), "not in the store"))
+
+    def _silence(self, at_ms: int) -> None:
+        self._took(self._engine.silence(at_ms / 1000 - POLL_S))
+
+    def _took(self, actions: Sequence[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Publish) and action.machine == self._machine:
+                self._told += [
+                    change.value
+                    for change in action.changes
+                    if change.name == PRODUCTION and not change.is_historical and isinstance(change.value, str)
+                ]
+
+
+def _births_before(store: Store, machine: str, from_ms: int) -> Iterator[HostEvent]:
+    """Yield a birth for each edge that was alive when the stretch began, with the last values of the day before it."""
+    inputs: Collection[str] = PROCESSOR.inputs or ()
+    nodes: dict[str, list[str]] = {}
+    for one in store.series(machine):
+        name = one.node.rpartition("/")[2]
+        if not is_twin_node(name) and one.first_us < from_ms * 1000:
+            nodes.setdefault(name, []).append(one.signal)
+    first = next(iter(store.messages(machine, from_ms - DAY_MS, from_ms)), None)
+    if first is None:
+        return
+    for node, signals in nodes.items():
+        asked = tuple(sorted({name for name in signals if name in inputs}))
+        columns = store.query(Query(machine, asked, from_ms - DAY_MS, from_ms)) if asked else []
+        readings = [
+            Reading(one.signal, one.value[-1], from_ms, one.quality[-1], one.unit, one.reason[-1], False)
+            for one in columns
+            if one.t_us
+        ]
+        if any(reading.quality is not Quality.STALE for reading in readings):
+            yield HostEvent(EventKind.BIRTH, NodeId(first.event.node.group, node), machine, from_ms, tuple(readings))
