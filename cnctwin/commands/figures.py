@@ -22,12 +22,24 @@ from processors.config import read_tables
 
 NAME = "production"
 _SHOWN = {
-    By.MACHINE: ("machine", "shifts", "planned_s", "production_s", "unknown_s", "parts", "good", "scrap"),
-    By.SHIFT: ("machine", "shift", "begin", "planned_s", "production_s", "unknown_s", "parts", "good", "scrap"),
+    By.MACHINE: ("machine", "shifts", "planned_s", "production_s", "unknown_s", "parts"),
+    By.SHIFT: ("machine", "shift", "begin", "planned_s", "production_s", "unknown_s", "parts"),
     By.PART: ("machine", "program", "shift", "begin", "end", "ideal_s", "active_s", "performance", "energy_kwh", "quality"),
     By.PROGRAM: ("machine", "program", "parts", "good", "scrap", "ideal_s", "active_s", "performance", "energy_a_part_kwh"),
 }
 _RATIOS = ("availability", "performance", "quality", "oee", "energy_kwh")
+_HEADS = {
+    "planned_s": "planned s",
+    "production_s": "run s",
+    "unknown_s": "unknown s",
+    "availability": "avail.",
+    "performance": "perf.",
+    "oee": "OEE",
+    "energy_kwh": "kWh",
+    "energy_a_part_kwh": "kWh a part",
+    "ideal_s": "ideal s",
+    "active_s": "active s",
+}
 _STOPS_SHOWN = 3
 
 
@@ -92,7 +104,7 @@ def _show(rows: list[Row], by: By) -> None:
     names = _SHOWN[by] if by in (By.PART, By.PROGRAM) else (*_SHOWN[by], *_RATIOS)
     shown = Table()
     for name in names:
-        shown.add_column(name.replace("_", " "))
+        shown.add_column(_HEADS.get(name, name), no_wrap=True)
     for row in rows:
         shown.add_row(*(_cell(name, row.get(name)) for name in names))
     console.print(shown)
@@ -101,17 +113,19 @@ def _show(rows: list[Row], by: By) -> None:
         stops = list(row.get("stops", {}).items())[:_STOPS_SHOWN]
         if stops:
             where = " ".join(filter(None, (row["machine"], row.get("shift"), moment_text(row["begin"]))))
-            console.print(f"{where}: " + "; ".join(f"{reason} {stop['s']:.0f} s ({stop['n']})" for reason, stop in stops))
+            console.print(
+                f"{where}: " + "; ".join(f"{reason} {stop['s']:.0f} s ({stop['n']})" for reason, stop in stops), markup=False
+            )
         reasons |= dict.fromkeys(f"{name}: {why}" for name, why in row.get("why", {}).items() if name != "oee")
     for reason in reasons:
-        console.print(reason)
+        console.print(reason, markup=False)
 
 
 def _cell(name: str, value: Any) -> str:
     if value is None:
         return "–"
     if name in ("begin", "end"):
-        return moment_text(value)
+        return moment_text(value)[5:16]
     if name in ("availability", "performance", "quality", "oee"):
         return f"{100.0 * value:.1f} %"
     return f"{value:.3f}" if "kwh" in name else f"{value:.0f}" if isinstance(value, float) else str(value)

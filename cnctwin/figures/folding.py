@@ -57,7 +57,8 @@ class _Folding:
     def records(self) -> list[str]:
         """Run, and return what came of it."""
         self._describe(self._from_ms)
-        for event in _births_before(self._store, self._machine, self._from_ms):
+        gap_ms = round(1000 * self._configuration.of(self._machine).gap_s_max)
+        for event in _births_before(self._store, self._machine, self._from_ms, gap_ms):
             self._feed(self._from_ms, event)
         last_ms = self._from_ms
         for received_ms, event in self._store.messages(self._machine, self._from_ms, self._to_ms):
@@ -89,7 +90,7 @@ class _Folding:
         elif event.kind is EventKind.DEATH:
             self._alive.pop(event.node, None)
         elif event.kind is EventKind.DATA and event.node not in self._alive:
-            names = [one.signal for one in self._store.series(self._machine) if one.node == event.node.node]
+            names = [one.signal for one in self._store.series(self._machine) if one.node in (event.node.node, str(event.node))]
             nulls = tuple(Reading(name, None, event.timestamp_ms, Quality.BAD, None, NOT_KNOWN, False) for name in names)
             self._feed(received_ms, event._replace(kind=EventKind.BIRTH, readings=nulls, names=()))
         self._heard_ms = received_ms
@@ -113,24 +114,24 @@ class _Folding:
                 ]
 
 
-def _births_before(store: Store, machine: str, from_ms: int) -> Iterator[HostEvent]:
-    """Yield a birth for each edge that was alive when the stretch began, with the last values of the day before it."""
+def _births_before(store: Store, machine: str, from_ms: int, gap_ms: int) -> Iterator[HostEvent]:
+    """Yield a birth for each edge that was heard of late when the stretch began, with the last values of the day before it."""
     inputs: Collection[str] = PROCESSOR.inputs or ()
-    nodes: dict[str, list[str]] = {}
-    for one in store.series(machine):
-        name = one.node.rpartition("/")[2]
-        if not is_twin_node(name) and one.first_us < from_ms * 1000:
-            nodes.setdefault(name, []).append(one.signal)
-    first = next(iter(store.messages(machine, from_ms - DAY_MS, from_ms)), None)
-    if first is None:
-        return
-    for node, signals in nodes.items():
-        asked = tuple(sorted({name for name in signals if name in inputs}))
+    alive: dict[NodeId, None] = {}
+    for _, event in store.messages(machine, from_ms - gap_ms, from_ms):
+        if event.kind is EventKind.HOLE and event.node.node == HISTORIAN_NODE:
+            alive.clear()
+        elif event.kind is EventKind.DEATH:
+            alive.pop(event.node, None)
+        elif event.kind in (EventKind.BIRTH, EventKind.DATA) and not is_twin_node(event.node.node):
+            alive[event.node] = None
+    series = store.series(machine)
+    for node in alive:
+        asked = tuple(sorted({one.signal for one in series if one.node in (node.node, str(node)) and one.signal in inputs}))
         columns = store.query(Query(machine, asked, from_ms - DAY_MS, from_ms)) if asked else []
-        readings = [
+        readings = tuple(
             Reading(one.signal, one.value[-1], from_ms, one.quality[-1], one.unit, one.reason[-1], False)
             for one in columns
             if one.t_us
-        ]
-        if any(reading.quality is not Quality.STALE for reading in readings):
-            yield HostEvent(EventKind.BIRTH, NodeId(first.event.node.group, node), machine, from_ms, tuple(readings))
+        )
+        yield HostEvent(EventKind.BIRTH, node, machine, from_ms, readings)
