@@ -47,8 +47,8 @@ def figure_routes(sources: Sources) -> APIRouter:
         if not 0 < (end_ms - start_ms) * max(len(machines), 1) <= MACHINE_DAYS_MAX * DAY_MS:
             raise ApiError(
                 400,
-                f"from {start_ms} to {end_ms} of {len(machines)} machines is no stretch of at most {MACHINE_DAYS_MAX} machine-days; "
-                "give a shorter one, or one machine",
+                f"from {start_ms} to {end_ms} of {len(machines)} machines is no stretch of at most {MACHINE_DAYS_MAX} "
+                "machine-days; give a shorter one, or one machine",
             )
         texts = [text for name in machines for text in await _records(sources, name, start_ms, end_ms)]
         rows, refused = await sources.store.work(lambda: _rows(texts, Asked(by, start_ms, end_ms)))

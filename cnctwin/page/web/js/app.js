@@ -12,6 +12,7 @@ import { Plant } from "./plant.js";
 import { Stream } from "./stream.js";
 import { age, moment } from "./text.js";
 import * as alerts from "./views/alerts.js";
+import * as figures from "./views/figures.js";
 import * as fleet from "./views/fleet.js";
 import * as gap from "./views/gap.js";
 import * as jobs from "./views/jobs.js";
@@ -19,7 +20,7 @@ import * as machine from "./views/machine.js";
 import * as replay from "./views/replay.js";
 import * as validation from "./views/validation.js";
 
-const VIEWS = lookup({ fleet, machine, gap, alerts, replay, validation, jobs });
+const VIEWS = lookup({ fleet, machine, gap, alerts, replay, validation, figures, jobs });
 const TABS = [
   ["fleet", "Fleet", "f"],
   ["machine", "Machine", "m"],
@@ -27,6 +28,7 @@ const TABS = [
   ["alerts", "Alerts", "a"],
   ["replay", "Replay", "r"],
   ["validation", "Parts", "p"],
+  ["figures", "OEE", "o"],
   ["jobs", "Jobs", "j"],
 ];
 const ALERTS_MS = 5000;
