@@ -6,6 +6,7 @@ CPU time is in µs a message of a machine, with 11 changing values. `each_us` is
     python -m benchmarks.fleet --machines 40 --each --prefer    # shared_us, each_us; broker_us, broker_mirror_us by its column
     python -m benchmarks.fleet --machines 20,100                # memory
     python -m benchmarks.fleet --machines 40 --prefer --processors mirror,expected    # less mirror alone, and so tool_wear
+    python -m benchmarks.fleet --machines 40 --processors events,production    # less events alone: production, on 2026-11-28
     cnctwin plan fleet --machines 1 --measure --json            # calibration_us
 """
 
@@ -51,6 +52,7 @@ MEASURED = Measured(
         "historian": 27.3,
         "joint_anomaly": 23.1,
         "mirror": 110.6,
+        "production": 49.0,
         "residual": 6.5,
         "rules": 56.5,
         "thermal": 31.5,
