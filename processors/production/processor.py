@@ -25,10 +25,10 @@ from processors.production.tally import Tally, opened, spent, with_part, with_qu
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
-from twin.vocabulary.twin_signals import PRODUCTION, PRODUCTION_NOW, STOPS, TWIN_PREFIX
+from twin.vocabulary.twin_signals import PART_ENERGY_KWH, PRODUCTION, PRODUCTION_NOW, STOPS, TWIN_PREFIX
 
 POWER, LOAD, PART_QUALITY = "spindle_power_kw", "spindle_load_pct", "part_quality"
-SHIFT, PART_ENERGY = f"{TWIN_PREFIX}shift", f"{TWIN_PREFIX}part_energy_kwh"
+SHIFT = f"{TWIN_PREFIX}shift"
 PARTS = {"made": f"{TWIN_PREFIX}parts_made", "good": f"{TWIN_PREFIX}parts_good", "scrap": f"{TWIN_PREFIX}parts_scrap"}
 RATIOS = {
     "availability": twin_signals.AVAILABILITY,
@@ -187,9 +187,9 @@ def _with_part(  # noqa: PLR0917
     tally = with_part(tally, active_s=part.active_s if part.complete else None, ideal_s=ideal_s)
     outputs.append(_part_output(sample.machine, part))
     if part.energy_kwh is None:
-        outputs.append(Output.null(PART_ENERGY, NO_POWER))
+        outputs.append(Output.null(PART_ENERGY_KWH, NO_POWER))
     else:
-        outputs.append(Output(PART_ENERGY, part.energy_kwh))
+        outputs.append(Output(PART_ENERGY_KWH, part.energy_kwh))
     return replace(state, tally=tally, part=part)
 
 
@@ -271,7 +271,7 @@ PROCESSOR = Processor(
         *(OutputSpec(signal, DataType.INT64, None, f"parts of the shift: {name}", _INFERRED) for name, signal in PARTS.items()),
         OutputSpec(SHIFT, DataType.STRING, None, "the shift that runs, as the calendar names it", _INFERRED),
         OutputSpec(ENERGY, _NUMBER, "kWh", "energy of the spindle drive in the shift", _INFERRED, 0.0001),
-        OutputSpec(PART_ENERGY, _NUMBER, "kWh", "energy of the spindle drive of the last part", _INFERRED),
+        OutputSpec(PART_ENERGY_KWH, _NUMBER, "kWh", "energy of the spindle drive of the last part", _INFERRED),
         OutputSpec(STOPS, DataType.TEXT, None, "stops of the shift by reason, JSON", _INFERRED),
         OutputSpec(
             PRODUCTION, DataType.TEXT, None, "record of a shift that is over or of a part that has ended, JSON", _INFERRED

@@ -75,7 +75,7 @@ PRODUCTION = Board(
             series=(
                 _sum("shift_energy_kwh", "shift"),
                 Reading(
-                    signal=f"{twin.TWIN_PREFIX}part_energy_kwh",
+                    signal=twin.PART_ENERGY_KWH,
                     legend="last part",
                     unit="kwatth",
                     right=True,

@@ -72,6 +72,7 @@ export const OEE = "twin/oee";
 export const AVAILABILITY = "twin/availability";
 export const PERFORMANCE = "twin/performance";
 export const QUALITY = "twin/quality";
+export const PART_ENERGY_KWH = "twin/part_energy_kwh";
 export const STOPS = "twin/stops";
 export const PRODUCTION = "twin/production";
 export const PRODUCTION_NOW = "twin/production_now";
