@@ -70,8 +70,8 @@ class _Folding:
             elif not is_twin_node(event.node.node):
                 self._silence(received_ms)
                 self._feed(received_ms, event)
-        if last_ms < self._to_ms:
-            self._silence(last_ms)  # what came after the last message nobody can tell
+        newest_ms = max((one.last_us // 1000 for one in self._store.series(self._machine)), default=0)
+        self._silence(min(max(newest_ms, last_ms), self._to_ms))  # beyond the newest sample nobody can tell
         lane = self._engine.lane_of(self._machine)
         tally = None if lane is None else settled(lane.state).tally
         if tally is not None and not tally.is_empty:
