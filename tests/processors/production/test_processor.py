@@ -163,6 +163,38 @@ def test_what_is_not_known_is_null_with_its_reason(
     assert ("availability" in nulls) is ("calendar" not in table)
 
 
+@pytest.mark.parametrize(
+    ("told", "element", "reason"),
+    [
+        ({"exec_state": "ACTIVE"}, "production_s", None),
+        ({"exec_state": "ACTIVE", "controller_mode": "MANUAL_DATA_INPUT"}, "setup_s", "mode MANUAL_DATA_INPUT"),
+        ({"controller_mode": "EDIT"}, "setup_s", "mode EDIT"),
+        ({"exec_state": "ACTIVE", "feed_override_pct": 0.0}, "delay_s", "feed override 0 %"),
+        ({"exec_state": "PROGRAM_STOPPED"}, "delay_s", "program stop (M0)"),
+        ({"exec_state": "INTERRUPTED", "tool_change_active": True}, "delay_s", "tool change"),
+        ({"exec_state": "READY", "program": ""}, "delay_s", "no program"),
+        ({"exec_state": "READY"}, "delay_s", "not told"),
+        ({"exec_state": "STOPPED", "alarm": "FAULT: door", "controller_mode": "MANUAL"}, "down_s", "alarm: FAULT: door"),
+        ({"exec_state": None}, "unknown_s", "no data"),
+        ({"exec_state": "DANCING"}, "unknown_s", "no data"),
+    ],
+)
+def test_what_the_control_tells_counts_to_one_time_element(
+    calendar: Path, told: dict[str, Any], element: str, reason: str | None
+) -> None:
+    engine = engine_of(PROCESSOR, calendar=str(calendar), told_s=1.0)
+    (now,) = _records(fed(engine, birth(0.0, **IDLE | told), data(200.0, ambient_temp_c=20.0)), "shift", PRODUCTION_NOW)
+    assert (now[element], now["planned_s"]) == (200.0, 200.0)
+    assert list(now["stops"]) == ([] if reason is None else [reason])
+
+
+def test_a_control_without_execution_state_produces_while_it_feeds(calendar: Path) -> None:
+    engine = engine_of(PROCESSOR, calendar=str(calendar), told_s=1.0)
+    stream = [birth(0.0, feed_mm_min=0.0, program="O1"), data(50.0, feed_mm_min=800.0), data(150.0, feed_mm_min=0.0)]
+    (now,) = _records(fed(engine, *stream, data(200.0, program="O2")), "shift", PRODUCTION_NOW)
+    assert now["production_s"] == pytest.approx(100.0, abs=1.0)
+
+
 def test_performance_can_be_above_one(calendar: Path) -> None:
     engine = engine_of(PROCESSOR, calendar=str(calendar), ideal_s={"O1": 125.0})
     assert _last(fed(engine, *_alive(640.0, *_shift_of_parts())))["performance"] == 1.25
