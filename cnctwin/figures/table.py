@@ -75,7 +75,7 @@ def _shift(told: Sequence[ShiftTold], parts: Sequence[PartTold], asked: Asked) -
     head: Row = {"machine": first.machine, "shift": first.shift, "begin": first.begin, "end": first.end}
     energy_s = sum(one.energy_s for one in told)
     energy_kwh = sum(one.energy_kwh or 0.0 for one in told) if energy_s > 0.0 else None
-    head |= {"over": all(one.over for one in told[-1:]), "planned_s": planned_s, **times, "stops": stops}
+    head |= {"over": all(one.over for one in told), "planned_s": planned_s, **times, "stops": stops}
     return _judged(head | {"energy_kwh": energy_kwh, "energy_s": energy_s, "calendar": has_calendar} | _made(parts), asked)
 
 

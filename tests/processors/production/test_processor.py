@@ -264,7 +264,7 @@ _TOLD = st.sampled_from(
 
 
 @given(steps=st.lists(st.tuples(st.integers(1, 700), _TOLD), max_size=25), cut=st.integers(0, 26))
-@settings(max_examples=examples(60, 25), deadline=None)
+@settings(max_examples=examples(60, 15), deadline=None)
 def test_times_add_up_and_a_restart_in_the_middle_changes_nothing(
     calendar: Path, steps: list[tuple[int, dict[str, Any] | None]], cut: int
 ) -> None:
