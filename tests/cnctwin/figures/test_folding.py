@@ -110,6 +110,28 @@ def test_a_dead_machine_is_unknown_before_the_stretch_and_in_it(store: Store, ta
     assert (shift.shift, shift.planned_s, shift.unknown_s) == ("late", 500.0, 400.0)
 
 
+def test_what_an_edge_sends_late_is_folded_at_its_own_time(store: Store, table: dict[str, object]) -> None:
+    """Offline from 100 s to 1000 s. At 90 s it stopped, and nobody heard it; from 200 s on it ran again."""
+    live = [birth(0.0, **IDLE), data(10.0, exec_state="ACTIVE"), death(100.0)]
+    late = [data(90.0, history=True, exec_state="FEED_HOLD"), data(200.0, history=True, exec_state="ACTIVE")]
+    late += [data(700.0, history=True, spindle_power_kw=2.0)]
+    back = [birth(1000.0, **IDLE | {"exec_state": "ACTIVE"}), data(1060.0, exec_state="READY"), data(1100.0, program="O2")]
+    received = [(one.timestamp_ms, one) for one in (*live, *back)] + [(T0_MS + 1_001_000, one) for one in late]
+    store.append([Message(at_ms, one) for at_ms, one in sorted(received, key=lambda pair: pair[0])])
+    ((shift,), _) = _read(folded(store, "okuma", T0_MS, T0_MS + 1_200_000, table))
+    assert shift.production_s == 90.0 + 860.0  # what the live processor took for running up to the death, it cannot take back
+    assert shift.unknown_s == 100.0
+
+
+def test_late_data_of_a_machine_that_was_heard_changes_nothing(store: Store, table: dict[str, object]) -> None:
+    stream = _two_shifts()
+    _kept(store, stream)
+    before = folded(store, "okuma", T0_MS, T0_MS + 7_200_000, table)
+    again = [data(100.0 * n + 40, history=True, exec_state="STOPPED") for n in range(5)]
+    store.append([Message(T0_MS + 7_100_000, event) for event in again])
+    assert folded(store, "okuma", T0_MS, T0_MS + 7_200_000, table) == before
+
+
 def test_a_stretch_without_a_message_has_no_figures(store: Store, table: dict[str, object]) -> None:
     _kept(store, _two_shifts())
     assert folded(store, "okuma", T0_MS + 10**10, T0_MS + 10**10 + 7_200_000, table) == []
