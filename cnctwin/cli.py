@@ -43,6 +43,7 @@ COMMANDS = {
     "train": "cnctwin.commands.train.app:train_app",
     "store": "cnctwin.commands.store:store_app",
     "parts": "cnctwin.commands.parts:parts_app",
+    "figures": "cnctwin.commands.figures.command:figures",
     "jobs": "cnctwin.commands.jobs:jobs_app",
     "plan": "cnctwin.commands.plan:plan_app",
     "twin": "cnctwin.commands.twin:twin_app",

@@ -130,6 +130,18 @@ class Events(Answer):
     descriptions: list[dict[str, Any]] = Field(default_factory=list)
 
 
+class Figures(Answer):
+    """Production figures (docs/production.md): rows by machine, shift, part or program; a figure that is not known is null."""
+
+    from_: T = Field(alias="from")
+    to: T
+    by: Literal["machine", "shift", "part", "program"]
+    left_out: int = Field(0, description="rows that were beyond the limit: the oldest")
+    refused: int = Field(0, description="records that had not the shape of one")
+    note: str = Field("", description="why there is no row; empty where there is one")
+    rows: list[dict[str, Any]]
+
+
 class Parts(Answer):
     """As-built records (docs/part_record.schema.json), newest first."""
 

@@ -18,6 +18,7 @@ from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.routes.alerts import alert_routes
 from cnctwin.api.routes.anomaly import anomaly_routes
+from cnctwin.api.routes.figures import figure_routes
 from cnctwin.api.routes.gap import gap_routes
 from cnctwin.api.routes.health import health_routes
 from cnctwin.api.routes.history import history_routes
@@ -77,6 +78,7 @@ def create_app(sources: Sources) -> FastAPI:
         job_routes(sources),
         history_routes(sources.live, sources.store),
         past_routes(sources),
+        figure_routes(sources),
         metrics_routes(sources, fan_out, subscriptions),
         models_routes(sources),
         people_routes(sources.access, sources.audit),

@@ -24,12 +24,16 @@ from sparkplug.errors import TopicError
 from sparkplug.topics import check_id
 from twin.vocabulary.nodes import HISTORIAN_NODE
 
-PROCESSORS = ("thermal", "cutting_force", "expected", "gap", "rules", "joint_anomaly", "alerts", "events", "mirror", "historian")
+PROCESSORS = (
+    *("thermal", "cutting_force", "expected", "gap", "rules", "joint_anomaly", "alerts", "events", "production", "mirror"),
+    "historian",
+)
 START_S_MAX = 15.0
 PAGE_PORT = 8080
 NONE = "none"
 
 ASSUMED = Path(__file__).with_name("assumed.toml")
+CALENDAR = Path(__file__).with_name("calendar.toml")
 _RECORDED_TOML = """\
 # A recording may have no sensor of the air, and its machine is nobody's to correct.
 [thermal]
@@ -48,6 +52,7 @@ diagnose = "by_hand"
 # At twenty times real time, a second on the way between two processors is twenty of the machine's.
 _LATE_TOML = "\n[rules]\nlate_s_max = 60.0\n\n[alerts]\nlate_s_max = 60.0\n"
 _LOOP_TOML = 'diagnose = "{diagnose}"\npromote = "{promote}"\n'  # [loop] is the last table of the simulated machine's
+_PRODUCTION_TOML = "\n[production]\ncalendar = {calendar}\nexpectations = {expectations}\n"
 _NO_MODEL_TOML = "\n[joint_anomaly]\n"
 _HISTORIAN_TOML = "\n[historian]\nstore = {store}\nraw_days = 36500.0\n"  # a recording may be years old
 
@@ -207,7 +212,8 @@ class Demo:
         )
         folder = self._folder / "expectations"
         expected = place_expectation(folder, self.machine)
-        return settings + expected + place_model(self._folder / "models", self.machine, folder)
+        figures = _PRODUCTION_TOML.format(calendar=json.dumps(str(CALENDAR)), expectations=json.dumps(str(folder)))
+        return settings + expected + figures + place_model(self._folder / "models", self.machine, folder)
 
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""

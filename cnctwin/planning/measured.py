@@ -6,6 +6,7 @@ CPU time is in µs a message of a machine, with 11 changing values. `each_us` is
     python -m benchmarks.fleet --machines 40 --each --prefer    # shared_us, each_us; broker_us, broker_mirror_us by its column
     python -m benchmarks.fleet --machines 20,100                # memory
     python -m benchmarks.fleet --machines 40 --prefer --processors mirror,expected    # less mirror alone, and so tool_wear
+    python -m benchmarks.fleet --machines 40 --processors events,production    # less events alone: production, on 2026-11-28
     cnctwin plan fleet --machines 1 --measure --json            # calibration_us
 """
 
@@ -51,6 +52,7 @@ MEASURED = Measured(
         "historian": 27.3,
         "joint_anomaly": 23.1,
         "mirror": 110.6,
+        "production": 49.0,
         "residual": 6.5,
         "rules": 56.5,
         "thermal": 31.5,
@@ -110,6 +112,7 @@ class MeasuredOnKafka:
 # With 100 machines at 10 Hz. A result is what all but the mirror cost beyond a message, over 1.1 results a message; a value is
 # what the mirror costs beyond it, over 11. `state_us` is that of cProfile, an upper bound: saving each second or each 30 s made
 # no difference beyond the noise of some per cent. Up to 1.2 cores were busy elsewhere while the mirror was measured, 0.2 else.
+# `production` was measured on 2026-11-28, on a busy computer, beside `events`: .82 of it.
 ON_KAFKA = MeasuredOnKafka(
     date="2026-11-24",
     computer="AMD EPYC, 2 cores, Kafka 4.3 and the load on them too",
@@ -127,6 +130,7 @@ ON_KAFKA = MeasuredOnKafka(
         "gap": 19.4,
         "joint_anomaly": 12.3,
         "mirror": 122.0,
+        "production": 17.6,
         "residual": 11.1,
         "rules": 24.6,
         "thermal": 19.5,

@@ -7,12 +7,13 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from processors.alarms import alarm_signals, unknown_processors
-from processors.alerts.quiet import QuietHours, TimeZone
+from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
 from processors.alerts.words.language import ENGLISH
 from processors.config import CellConfig
 from processors.lag_report import BEHIND_S
+from processors.wall_clock import TimeZoneName
 from twin.vocabulary import twin_signals
 
 RULES = twin_signals.RULES
@@ -105,7 +106,7 @@ class AlertsConfig(CellConfig):
     forget_after_s: float = Field(default=604_800.0, ge=3600.0, le=365 * 86_400.0)
     external_url: str = Field(default="", max_length=200)
     language: str = Field(default=ENGLISH, min_length=1, max_length=300)
-    time_zone: TimeZone = "UTC"
+    time_zone: TimeZoneName = "UTC"
     receivers: dict[str, AnyReceiver] = Field(default_factory=dict, max_length=RECEIVERS_MAX)
     routes: tuple[Route, ...] = Field(default=(), max_length=ROUTES_MAX)
     quiet_hours: tuple[QuietHours, ...] = Field(default=(), max_length=ROUTES_MAX)

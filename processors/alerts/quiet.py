@@ -1,26 +1,11 @@
 """Quiet hours: times of the week, by the clock on the wall of the shop, in which only high alerts are told at once."""
 
-import re
 from datetime import UTC, datetime, timedelta
-from functools import lru_cache
-from typing import Annotated, Self
-from zoneinfo import ZoneInfo
+from typing import Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
-DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
-_CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d)")
-
-
-def _known(name: str) -> str:
-    try:
-        _zone(name)
-    except Exception as error:
-        raise ValueError(f"no time zone {name!r}; name one as Europe/Berlin, or UTC") from error
-    return name
-
-
-TimeZone = Annotated[str, AfterValidator(_known)]
+from processors.wall_clock import DAYS, TimeOfDay, TimeZoneName, minutes, zone
 
 
 class QuietHours(BaseModel):
@@ -28,18 +13,11 @@ class QuietHours(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    time_zone: TimeZone
-    start: str
-    end: str
+    time_zone: TimeZoneName
+    start: TimeOfDay
+    end: TimeOfDay
     days: tuple[str, ...] = DAYS
     receivers: tuple[str, ...] = ()  # none named: all
-
-    @field_validator("start", "end")
-    @classmethod
-    def _is_a_time(cls, text: str) -> str:
-        if not _CLOCK.fullmatch(text):
-            raise ValueError(f"{text!r} is no time of the day; write it as 22:00")
-        return text
 
     @model_validator(mode="after")
     def _has_days(self) -> Self:
@@ -59,19 +37,9 @@ class QuietHours(BaseModel):
         """
         if self.receivers and receiver not in self.receivers:
             return False
-        local = datetime.fromtimestamp(wall_s, UTC).astimezone(_zone(self.time_zone))
-        now, start, end = local.hour * 60 + local.minute, _minutes(self.start), _minutes(self.end)
+        local = datetime.fromtimestamp(wall_s, UTC).astimezone(zone(self.time_zone))
+        now, start, end = local.hour * 60 + local.minute, minutes(self.start), minutes(self.end)
         today, yesterday = DAYS[local.weekday()], DAYS[(local - timedelta(days=1)).weekday()]
         if start < end:
             return start <= now < end and today in self.days
         return (now >= start and today in self.days) or (now < end and yesterday in self.days)
-
-
-@lru_cache(maxsize=64)
-def _zone(name: str) -> ZoneInfo:
-    return ZoneInfo(name)
-
-
-def _minutes(clock: str) -> int:
-    hours, minutes = clock.split(":")
-    return int(hours) * 60 + int(minutes)

@@ -23,6 +23,9 @@ STEADY: dict[str, Value] = {  # told once, a minute after the beginning
     "twin/anomaly_threshold": 0.4, "twin/gated_share_pct": 3.0, "twin/common_mode": False, "twin/gap_growing": False,
     "twin/gap_left_out_pct": 11.0, "twin/rule_load_over_limit": False, "twin/rule_thermal_runaway": False,
     "twin/anomaly_alarm": False, "twin/rule_load_without_feed": False, "twin/rule_vibration": True,
+    "twin/oee": 0.61, "twin/availability": 0.75, "twin/performance": 0.9, "twin/quality": 0.91, "twin/planned_s": 3600.0,
+    "twin/production_s": 2700.0, "twin/setup_s": 300.0, "twin/delay_s": 500.0, "twin/down_s": 100.0, "twin/unknown_s": 0.0,
+    "twin/parts_made": 10, "twin/parts_good": 9, "twin/parts_scrap": 1, "twin/shift_energy_kwh": 2.0, "twin/part_energy_kwh": 0.2,
 }  # fmt: skip
 FAST = (
     "spindle_rpm", "spindle_load_pct", "feed_mm_min", "axis_x_load_pct", "axis_z_load_pct", "spindle_temp_c",

@@ -85,6 +85,7 @@ _TABLE = (
     _number("vibration_velocity_mm_s", "mm/s", 0, 5_000, "vibration as velocity, rms"),
     Signal("coolant_on", Kind.FLAG, "the coolant flows"),
     _text("alarm", "alarms that the control shows"),
+    _text("part_quality", "good or scrap, of the part that ended last; a serial number may follow"),
     _number("clock_offset_s", "s", -1e12, 1e12, "clock of the control minus clock of the edge"),
     _number("clock_offset_spread_s", "s", 0, 1e12, "how far clock_offset_s may be off"),
     _text("stamp_clock", "the clock that values are stamped by", frozenset({"control", "edge"})),

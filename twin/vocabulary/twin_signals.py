@@ -108,6 +108,19 @@ SEVERITY = f"{TWIN_PREFIX}severity"
 STOP_REASON = f"{TWIN_PREFIX}stop_reason"
 PART_RECORD = f"{TWIN_PREFIX}part_record"
 
+# production
+OEE = f"{TWIN_PREFIX}oee"
+AVAILABILITY = f"{TWIN_PREFIX}availability"
+PERFORMANCE = f"{TWIN_PREFIX}performance"
+QUALITY = f"{TWIN_PREFIX}quality"
+PART_ENERGY_KWH = f"{TWIN_PREFIX}part_energy_kwh"
+STOPS = f"{TWIN_PREFIX}stops"
+"""JSON text: the stops of the shift by reason, each with its time element, seconds and count."""
+PRODUCTION = f"{TWIN_PREFIX}production"
+"""JSON text: the record of a shift that is over, or of a part that has ended (processors/production/record.py)."""
+PRODUCTION_NOW = f"{TWIN_PREFIX}production_now"
+"""JSON text: the record of the shift that runs, so far."""
+
 # alerts
 ALERT_STATE = f"{TWIN_PREFIX}alert_state"
 

@@ -1,7 +1,6 @@
 """Routes to the past: GET /events/{machine}, /parts/{machine}, /validation/{machine}, POST /twin/replay."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
@@ -9,16 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Events, Parts, Replayed, Validation
 from cnctwin.api.errors import ApiError
-from cnctwin.api.event_list import EVENTS_MAX, description_text, event_signals, events_of, part_records
-from cnctwin.api.live.trace import Sample
+from cnctwin.api.event_list import EVENTS_MAX, description_text, events_of, part_records
 from cnctwin.api.replay_child import replayed
 from cnctwin.api.routes.history import MS_MAX, FromMs, ToMs
 from cnctwin.api.routes.plant import BUSY, UNKNOWN, Machine, unknown_machine
+from cnctwin.api.samples import samples_of
 from cnctwin.api.sources import Sources
-from cnctwin.api.value_object import plain
 from cnctwin.memory.descriptions import described, faults
-from cnctwin.memory.store.contract import Query as StoreQuery
-from cnctwin.memory.store.contract import Store, StoreError
+from cnctwin.memory.store.contract import Store
 from sparkplug.clock import now_ms
 from twin.vocabulary.twin_signals import PART_RECORD
 
@@ -50,7 +47,7 @@ def past_routes(sources: Sources) -> APIRouter:
     async def events(machine: Machine, from_ms: FromMs = None, to_ms: ToMs = None) -> Any:
         """Execution states, programs, tool changes, alarms, stops, parts, holes, pins and descriptions; a day if not said."""
         start_ms, end_ms = _stretch(from_ms, to_ms)
-        found, source = await _samples(sources, machine, None, start_ms, end_ms)
+        found, source = await samples_of(sources, machine, None, start_ms, end_ms)
         told = events_of(found)
         descriptions: list[dict[str, Any]] = []
         if sources.store.configured and source == "store":
@@ -72,7 +69,7 @@ def past_routes(sources: Sources) -> APIRouter:
     ) -> Any:
         """The as-built records of the parts that were made, newest first: what, with which tools, how hot, with what force."""
         start_ms, end_ms = _stretch(from_ms, to_ms)
-        found, source = await _samples(sources, machine, (PART_RECORD,), start_ms, end_ms)
+        found, source = await samples_of(sources, machine, (PART_RECORD,), start_ms, end_ms)
         records = part_records(found.get(PART_RECORD, ()))
         return {"machine": machine, "from": start_ms, "to": end_ms, "source": source, "parts": records[:limit]}
 
@@ -99,46 +96,6 @@ def past_routes(sources: Sources) -> APIRouter:
             return await replayed(sources.store.where, stretch.machine, start_ms, end_ms, sources.constants.path)
 
     return router
-
-
-async def _samples(
-    sources: Sources, machine: str, signals: tuple[str, ...] | None, from_ms: int, to_ms: int
-) -> tuple[Mapping[str, Sequence[Sample]], str]:
-    """The samples of signals (None: those that tell events), and where they are from. Raises ApiError."""
-    live = sources.live
-    if sources.store.configured:
-        try:
-            found = await sources.store.ask(lambda store: _stored(store, machine, signals, from_ms, to_ms))
-        except (ApiError, StoreError):
-            if machine not in live.machines():
-                raise
-        else:
-            if found is None:
-                raise unknown_machine(machine, live.machines())
-            return found, "store"
-    if machine not in live.machines():
-        raise unknown_machine(machine, live.machines())
-    asked = signals or event_signals(live.readings(machine))
-    return {name: held for name, (_, held) in live.recent(machine, asked, from_ms, to_ms).items()}, "memory"
-
-
-def _stored(
-    store: Store, machine: str, signals: tuple[str, ...] | None, from_ms: int, to_ms: int
-) -> dict[str, Sequence[Sample]] | None:
-    known = {one.signal for one in store.series(machine)}
-    if not known and machine not in store.machines():
-        return None
-    asked = event_signals(known) if signals is None else tuple(name for name in signals if name in known)
-    if not asked:
-        return {}
-    columns = store.query(StoreQuery(machine, asked, from_ms, to_ms))
-    return {
-        one.signal: [
-            Sample(t_us // 1000, plain(value)[0], quality, reason)
-            for t_us, value, quality, reason in zip(one.t_us, one.value, one.quality, one.reason, strict=True)
-        ]
-        for one in columns
-    }
 
 
 def _descriptions(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ OF_THE_PLANT = (
     "/anomaly/{machine}",
 )
 OF_JOBS = ("/jobs", "/jobs/{job_id}", "/jobs/{job_id}/files/{name}")
-OF_THE_PAST = ("/history/{machine}", "/events/{machine}", "/parts/{machine}", "/validation/{machine}")
+OF_THE_PAST = ("/history/{machine}", "/events/{machine}", "/parts/{machine}", "/figures", "/validation/{machine}")
 OF_THE_SERVER = ("/health", "/livez", "/readyz", "/metrics", "/whoami", "/audit", "/models")
 ASKED = ("/silences", "/predict", "/twin/replay", "/alerts/{fingerprint}/acknowledge", "/jobs")
 OF_ITS_OWN = ("/silences/{silence_id}/end", "/anomaly/{machine}/verdict", "/models/{kind}/{machine}/promote")

@@ -12,6 +12,7 @@ import { Plant } from "./plant.js";
 import { Stream } from "./stream.js";
 import { age, moment } from "./text.js";
 import * as alerts from "./views/alerts.js";
+import * as figures from "./views/figures.js";
 import * as fleet from "./views/fleet.js";
 import * as gap from "./views/gap.js";
 import * as jobs from "./views/jobs.js";
@@ -19,8 +20,7 @@ import * as machine from "./views/machine.js";
 import * as parts from "./views/parts.js";
 import * as replay from "./views/replay.js";
 
-
-const VIEWS = lookup({ fleet, machine, gap, alerts, replay, parts, jobs });
+const VIEWS = lookup({ fleet, machine, gap, alerts, replay, parts, figures, jobs });
 const RENAMED = lookup({ validation: "parts" }); // addresses that people have kept
 const TABS = [
   ["fleet", "Fleet", "f"],
@@ -29,6 +29,7 @@ const TABS = [
   ["alerts", "Alerts", "a"],
   ["replay", "Replay", "r"],
   ["parts", "Parts", "p"],
+  ["figures", "OEE", "o"],
   ["jobs", "Jobs", "j"],
 ];
 const PER_MACHINE = ["machine", "gap", "replay", "parts"];

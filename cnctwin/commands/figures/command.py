@@ -1,0 +1,75 @@
+"""`cnctwin figures`: OEE, stops, parts and energy by machine, shift, part or program, folded out of the store."""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cnctwin.commands.figures.shown import show
+from cnctwin.commands.moment import moment_ms, moment_text
+from cnctwin.commands.options import AsJson, StorePlace
+from cnctwin.errors import UsageError
+from cnctwin.figures.comma_separated import to_csv
+from cnctwin.figures.documents import read_records
+from cnctwin.figures.folding import folded
+from cnctwin.figures.table import Asked, By, table
+from cnctwin.memory.store.opening import default_place, open_store
+from processors.config import read_tables
+
+NAME = "production"
+
+
+def figures(
+    begin: Annotated[str, typer.Option("--from", help="ISO 8601, ms since 1970, or -1d; the shift that holds it is in")],
+    end: Annotated[str | None, typer.Option("--to", help="The same; else now", show_default=False)] = None,
+    machine: Annotated[str | None, typer.Option(help="One machine; else --all", show_default=False)] = None,
+    every: Annotated[bool, typer.Option("--all", help="All machines of the store")] = False,
+    by: Annotated[By, typer.Option(help="The rows of the table")] = By.SHIFT,
+    store: StorePlace = None,
+    config: Annotated[
+        Path | None, typer.Option(help="TOML with \\[production]: calendar, expectations", show_default=False)
+    ] = None,
+    calendar: Annotated[
+        Path | None, typer.Option(help="Shift calendar, in place of the configured one", show_default=False)
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write CSV to this file; - = standard output", show_default=False)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """OEE, stops by reason, parts and energy, folded out of the store as the processor `production` does live."""
+    if (machine is None) is not every:
+        raise UsageError("name one machine with --machine, or all of them with --all")
+    from_ms = moment_ms(begin, "--from")
+    to_ms = time.time_ns() // 1_000_000 if end is None else moment_ms(end, "--to")
+    if to_ms <= from_ms:
+        raise UsageError(f"--to {moment_text(to_ms)} is not after --from {moment_text(from_ms)}")
+    settings = _settings(config, calendar)
+    opened = open_store(store or default_place())
+    try:
+        known = opened.machines()
+        if machine is not None and machine not in known:
+            raise UsageError(f"the store has no machine {machine!r}; it has: {', '.join(known) or 'none'}")
+        chosen = known if machine is None else [machine]
+        texts = [text for name in chosen for text in folded(opened, name, from_ms, to_ms, settings)]
+    finally:
+        opened.close()
+    shifts, parts, _ = read_records(texts)
+    first_ms = min((one.begin for one in shifts if one.begin <= from_ms < one.end), default=from_ms)
+    share = {"known_share_min": settings["known_share_min"]} if "known_share_min" in settings else {}
+    rows = table(shifts, parts, Asked(by, first_ms, to_ms, **share))
+    if csv is not None and str(csv) != "-":
+        csv.write_text(to_csv(rows, by), encoding="utf-8", newline="")
+    elif csv is not None:
+        sys.stdout.write(to_csv(rows, by))
+    if as_json:
+        sys.stdout.write(json.dumps({"from": from_ms, "to": to_ms, "by": str(by), "rows": rows}, ensure_ascii=False) + "\n")
+    elif csv is None:
+        show(rows, by)
+
+
+def _settings(config: Path | None, calendar: Path | None) -> dict[str, Any]:
+    """Return the table of `production`, with the paths in it as they stand."""
+    settings = {} if config is None else dict(read_tables(config).get(NAME, {}))
+    return settings if calendar is None else settings | {"calendar": str(calendar)}

@@ -1,0 +1,1 @@
+"""Production figures out of a store: the fold over history, tables by machine, shift, part and program, CSV."""

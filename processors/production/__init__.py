@@ -1,0 +1,1 @@
+"""Production figures: shifts, OEE, stops, parts, energy. `processor.py` declares the processor."""
