@@ -7,7 +7,6 @@ from edge.controls.mtconnect.documents import DevicesDocument, parse_document
 from edge.controls.mtconnect.mapping import assign
 from edge.errors import ConfigError, ConnectionLostError, DocumentError
 from edge.sample import EdgeSample, Offer
-from edge.signals import signal
 
 
 def describe(config: Config) -> list[Row]:
@@ -43,4 +42,4 @@ def _row(config: Config, offer: Offer, sample: EdgeSample | None) -> Row:
     section = config.signals.get(offer.signal)
     native = (section.native_unit if section else "") or offer.native_unit
     value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
-    return Row(offer.signal, offer.source, signal(offer.signal).unit, native, value, reason)
+    return Row(offer.signal, offer.source, offer.declared.unit, native, value, reason)
