@@ -108,7 +108,8 @@ def test_the_controls_own_count_stands_beside_the_parts_left_of_the_tool_in_the_
     rows = page.locator("details.tools tbody tr")
     expect(rows.nth(0).locator("td").nth(5)).to_have_text("18.5 of 60 min")
     expect(rows.nth(1).locator("td").nth(5)).to_have_text("–")
-    shop.other["vmc"] = told | {"tool_life_used_count": SignalValue(37), "tool_life_limit_count": SignalValue(None)}
+    no_minutes = {name: SignalValue(None, "min") for name in ("tool_life_used_min", "tool_life_limit_min")}
+    shop.other["vmc"] = told | no_minutes | {"tool_life_used_count": SignalValue(37)}
     expect(rows.nth(0).locator("td").nth(5)).to_have_text("37 uses")
 
 
