@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 from pydantic import BaseModel
 
 import edge.controls
+from edge.chosen import Chosen
 from edge.config import EdgeConfig
 from edge.errors import ConfigError
 from edge.place import Place
@@ -69,13 +70,19 @@ class Row:
     reason: str | None
 
 
+def no_address(chosen: Chosen) -> object:
+    """Refuse an address, for a control of which nothing is read by address."""
+    raise ConfigError("nothing can be read by its address on this control; remove the table")
+
+
 @dataclass(frozen=True, slots=True)
 class Adapter:
     """One kind of control.
 
     `place` says up to where a cursor has taken everything (None: not begun); `resume` is `start` from such a place.
     `describe` says what would be published, asking the control but no broker; `draft` writes a configuration for the control at
-    an address (and the device of that name, where it serves several), which begins with one of `schemes`.
+    an address (and the device of that name, where it serves several), which begins with one of `schemes`. `address` reads the
+    address of a chosen variable or PLC signal as this kind of control writes it, or raises ConfigError.
     """
 
     name: str
@@ -89,6 +96,7 @@ class Adapter:
     describe: Callable[[EdgeConfig[Any]], list[Row]]
     draft: Callable[[str, str], str]
     sample_config: Path
+    address: Callable[[Chosen], object] = no_address
 
 
 @cache

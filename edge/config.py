@@ -11,6 +11,7 @@ from typing import Annotated, Generic, Literal, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from edge.accelerometer.section import AccelerometerSection
+from edge.chosen import Chosen, PlcSection, VariableSection, chosen_of
 from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import signal
@@ -128,6 +129,8 @@ class EdgeConfig(Generic[SourceT]):
     tool_change: ToolChangeSection = field(default_factory=ToolChangeSection)
     store: StoreSection = field(default_factory=StoreSection)
     accelerometer: AccelerometerSection = field(default_factory=AccelerometerSection)
+    variables: dict[str, VariableSection] = field(default_factory=dict)
+    plc: dict[str, PlcSection] = field(default_factory=dict)
     path: Path = Path("edge.toml")
 
     def __post_init__(self) -> None:
@@ -145,6 +148,11 @@ class EdgeConfig(Generic[SourceT]):
             conversion(section.native_unit, known.unit)
         if known.kind is not Kind.NUMBER and (section.deadband or section.scale != 1.0):
             raise ConfigError("scale and deadband need a number; remove them")
+
+    @property
+    def chosen(self) -> tuple[Chosen, ...]:
+        """Return what is read by its address on the control."""
+        return chosen_of(self.variables, self.plc)
 
     @property
     def node(self) -> str:

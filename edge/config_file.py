@@ -8,6 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from edge.accelerometer.section import AccelerometerSection
 from edge.adapter import find, modules
+from edge.chosen import PlcAddresses, Variables
 from edge.config import (
     BrokerSection,
     EdgeConfig,
@@ -28,6 +29,8 @@ _SECTIONS: dict[str, TypeAdapter[Any]] = {
     "tool_change": TypeAdapter(ToolChangeSection),
     "store": TypeAdapter(StoreSection),
     "accelerometer": TypeAdapter(AccelerometerSection),
+    "variables": TypeAdapter(Variables),
+    "plc": TypeAdapter(PlcAddresses),
 }
 
 
@@ -51,10 +54,17 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
     chosen: str = sections["machine"].adapter
     if chosen not in modules():
         raise ConfigError(f"{path}: machine.adapter = {chosen!r}: no such adapter; there are {', '.join(modules())}")
-    source = _section(path, chosen, TypeAdapter(find(chosen).config_model), tables.pop(chosen, {}))
+    adapter = find(chosen)
+    source = _section(path, chosen, TypeAdapter(adapter.config_model), tables.pop(chosen, {}))
     if tables:
         raise ConfigError(f"{path}: [{next(iter(tables))}]: no such table; there are {', '.join(_SECTIONS)} and {chosen}")
-    return EdgeConfig(source=source, path=path, **sections)
+    config = EdgeConfig(source=source, path=path, **sections)
+    for one in config.chosen:
+        try:
+            adapter.address(one)
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {one.table}.address: {error}") from error
+    return config
 
 
 def _section(path: Path, name: str, kind: TypeAdapter[Any], raw: object) -> Any:

@@ -33,7 +33,10 @@ Outcome = tuple[Value, Quality, str | None]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One data item and the signal that it feeds: canonical = value * factor + offset."""
+    """One data item and the signal that it feeds: canonical = value * factor + offset.
+
+    `kind` is that of a chosen PLC address; None: as the vocabulary has it.
+    """
 
     data_item_id: str
     signal: str
@@ -41,11 +44,18 @@ class Target:
     offset: float = 0.0
     low: float | None = None
     high: float | None = None
+    kind: Kind | None = None
+
+    @property
+    def known(self) -> Signal:
+        """Return the canonical signal, of the kind that the configuration chose."""
+        known = signal(self.signal)
+        return known if self.kind is None else replace(known, kind=self.kind)
 
 
 def read(target: Target, text: str) -> Outcome:
     """The value that this text stands for. A null always has a reason."""
-    known = signal(target.signal)
+    known = target.known
     if text == "UNAVAILABLE":
         return None, Quality.BAD, UNAVAILABLE
     if len(text) > TEXT_LENGTH_MAX:
@@ -71,7 +81,7 @@ def read_value(target: Target, value: Value) -> Outcome:
     >>> read_value(Target("tool", "tool_number"), 7.5)
     (None, <Quality.BAD: 0>, 'not a whole number: 7.5')
     """
-    known = signal(target.signal)
+    known = target.known
     if value is None:
         return None, Quality.BAD, UNAVAILABLE
     if isinstance(value, str):

@@ -4,11 +4,13 @@ Observations are counted where they are read, so that at each publication receiv
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from edge.signals import signal
 from sparkplug.metric import Change
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import Kind, Signal
 
 UNAVAILABLE = "unavailable"  # the reason of a null that the control does not report
 EMPTY = "empty"  # the reason of a null that the control reports as an empty value
@@ -67,13 +69,26 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A signal that the control offers, for the birth certificate: where it comes from, and its declared limits."""
+    """A signal that the control offers, for the birth certificate: where it comes from, and its declared limits.
+
+    `unit` and `kind` are those of a chosen variable or PLC address, which the vocabulary leaves to the configuration.
+    """
 
     signal: str
     source: str
     native_unit: str = ""
     low: float | None = None
     high: float | None = None
+    unit: str = ""
+    kind: Kind | None = None
+
+    @property
+    def declared(self) -> Signal:
+        """Return the canonical signal with what this offer says of it."""
+        known = signal(self.signal)
+        low = known.low if self.low is None else self.low
+        high = known.high if self.high is None else self.high
+        return replace(known, unit=known.unit or self.unit, kind=self.kind or known.kind, low=low, high=high)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ def signal(name: str) -> Signal:
     known = canonical(name)
     if known is None:
         raise ConfigError(
-            f"signal {name!r} is no canonical name; known are {', '.join(SIGNALS)} and axis_<letter>_pos_mm|pos_deg|load_pct"
+            f"signal {name!r} is no canonical name; known are {', '.join(SIGNALS)}, axis_<letter>_pos_mm|pos_deg|load_pct, "
+            "variable_<name> and plc_<name>"
         )
     return known

@@ -132,7 +132,7 @@ def test_who_may_write_where_is_said_of_topics_that_there_are(path: Path) -> Non
 
 def test_a_text_that_reads_like_a_canonical_signal_is_one() -> None:
     """Canonical names are spelled where they are used; a slip of the pen among them would be a signal that nobody publishes."""
-    subjects = "|".join(sorted({name.split("_")[0] for name in SIGNALS if "_" in name} | {r"axis_[a-z]\d?"}))
+    subjects = "|".join(sorted({name.split("_")[0] for name, known in SIGNALS.items() if known.unit} | {r"axis_[a-z]\d?"}))
     like = re.compile(rf"({subjects})_([a-z_]+_)?(rpm|rpm_cmd|pct|kw|a|c|g|mm_min|mm_s|pos_mm|pos_deg|s)")
     found = {text for path in SOURCES if ROOT / "twin" not in path.parents for text in texts(path) if like.fullmatch(text)}
     found |= {

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from edge.clock import offset as clock
 from edge.sample import EdgeSample, Offer
-from edge.signals import signal
 from edge.tool_change import CUE
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec
@@ -22,11 +21,9 @@ def device_metrics(offers: Iterable[Offer], last: Mapping[str, EdgeSample]) -> l
 
 
 def _metric(offer: Offer, last: EdgeSample | None) -> MetricSpec:
-    known = signal(offer.signal)
-    low = known.low if offer.low is None else offer.low
-    high = known.high if offer.high is None else offer.high
+    known = offer.declared
     properties = {"source": offer.source} | ({"nativeUnit": offer.native_unit} if offer.native_unit else {})
-    spec = MetricSpec(offer.signal, DATATYPES[known.kind], known.unit or None, low, high, properties)
+    spec = MetricSpec(offer.signal, DATATYPES[known.kind], known.unit or None, known.low, known.high, properties)
     if last is None:
         return spec
     return replace(spec, value=last.value, timestamp_ms=last.timestamp_ms, quality=last.quality, reason=last.reason)

@@ -8,6 +8,8 @@ either, because then each consumer would have to look at the quality before it c
 'outside 0 to 200 %: 950'
 >>> canonical("axis_x_pos_mm").unit
 'mm'
+>>> canonical("variable_part_width").kind, canonical("plc_7") is None
+(<Kind.NUMBER: 'number'>, True)
 """
 
 import re
@@ -18,6 +20,8 @@ EXEC_STATES = frozenset(
     {"ACTIVE", "READY", "INTERRUPTED", "FEED_HOLD", "STOPPED", "OPTIONAL_STOP", "PROGRAM_STOPPED", "PROGRAM_COMPLETED", "WAIT"}
 )
 CONTROLLER_MODES = frozenset({"AUTOMATIC", "MANUAL", "MANUAL_DATA_INPUT", "SEMI_AUTOMATIC", "EDIT"})
+# An alarm, in the signals `alarms` and `alarm_history`: null where the control does not tell.
+ALARM_FIELDS = ("code", "text", "severity", "active", "acknowledged", "since")
 
 
 class Kind(Enum):
@@ -86,6 +90,24 @@ _TABLE = (
     Signal("coolant_on", Kind.FLAG, "the coolant flows"),
     _text("alarm", "alarms that the control shows"),
     _text("part_quality", "good or scrap, of the part that ended last; a serial number may follow"),
+    _text("alarms", "the active alarms as a JSON list, each an object with " + ", ".join(f"`{field}`" for field in ALARM_FIELDS)),
+    _text("alarm_history", "the last entries of the control's own alarm log as a JSON list like `alarms`, newest last"),
+    _text("operator_message", "messages to the operator that the control shows"),
+    _text("program_comment", "comment of the NC program in its head"),
+    _number("tool_life_used_min", "min", 0, 1e6, "cutting time of the tool in the spindle, as the control counts it"),
+    _number("tool_life_limit_min", "min", 0, 1e6, "cutting time at which the control calls that tool worn"),
+    Signal("tool_life_used_count", Kind.INTEGER, "uses of the tool in the spindle, as the control counts them"),
+    Signal("tool_life_limit_count", Kind.INTEGER, "number of uses at which the control calls that tool worn"),
+    _number(
+        "tool_length_mm",
+        "mm",
+        -10_000,
+        10_000,
+        "length of the tool in the spindle, by the control's own offset in force, without wear",
+    ),
+    _number("tool_radius_mm", "mm", -1_000, 1_000, "radius of that tool, likewise"),
+    _number("tool_length_wear_mm", "mm", -1_000, 1_000, "wear offset of the length of that tool"),
+    _number("tool_radius_wear_mm", "mm", -1_000, 1_000, "wear offset of the radius of that tool"),
     _number("clock_offset_s", "s", -1e12, 1e12, "clock of the control minus clock of the edge"),
     _number("clock_offset_spread_s", "s", 0, 1e12, "how far clock_offset_s may be off"),
     _text("stamp_clock", "the clock that values are stamped by", frozenset({"control", "edge"})),
@@ -105,10 +127,24 @@ AXES = (
     (re.compile(r"axis_[a-z]\d{0,2}_load_pct"), _number("", "%", -500, 500, "load of an axis drive, of its rated load")),
 )
 
+# Signals that the configuration of an edge chooses and names. Their unit stands there too, and whether a PLC address is a flag.
+VARIABLE_PREFIX, PLC_PREFIX = "variable_", "plc_"
+CHOSEN_NAME = r"[a-z][a-z0-9_]{0,31}"
+CHOSEN = (
+    (
+        re.compile(VARIABLE_PREFIX + CHOSEN_NAME),
+        Signal("", Kind.NUMBER, "a variable of the control: macro variable, R or Q parameter; unit by configuration"),
+    ),
+    (
+        re.compile(PLC_PREFIX + CHOSEN_NAME),
+        Signal("", Kind.NUMBER, "an address of the control's PLC; unit by configuration, which may declare it a flag"),
+    ),
+)
+
 
 def canonical(name: str) -> Signal | None:
     """Return the signal of this canonical name, or None if there is none."""
     known = SIGNALS.get(name)
     if known is not None:
         return known
-    return next((replace(entry, name=name) for pattern, entry in AXES if pattern.fullmatch(name)), None)
+    return next((replace(entry, name=name) for pattern, entry in (*AXES, *CHOSEN) if pattern.fullmatch(name)), None)

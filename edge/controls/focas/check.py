@@ -6,7 +6,6 @@ from edge.controls.focas.connection import FocasConnection
 from edge.controls.focas.cursor import parse, start
 from edge.errors import ConnectionLostError
 from edge.sample import SampleSet
-from edge.signals import signal
 from edge.sweep import Sweep
 
 
@@ -19,7 +18,7 @@ def describe(config: Config) -> list[Row]:
     for offer in frame.offers or ():
         sample = last.get(offer.signal)
         value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
-        rows.append(Row(offer.signal, way + offer.source, signal(offer.signal).unit, offer.native_unit, value, reason))
+        rows.append(Row(offer.signal, way + offer.source, offer.declared.unit, offer.native_unit, value, reason))
     return rows
 
 

@@ -7,7 +7,6 @@ from edge.controls.heidenhain.cursor import parse, start
 from edge.controls.heidenhain.meaning import source_of
 from edge.errors import ConnectionLostError
 from edge.sample import UNAVAILABLE, EdgeSample, Offer
-from edge.signals import signal
 from edge.sweep import Sweep
 
 NO_TOOL = "this control tells it to nobody over LSV2; give its PLC address as plc.tool_number, or let program_text be true"
@@ -47,4 +46,4 @@ def first_look(config: Config) -> bytes:
 def _row(offer: Offer, sample: EdgeSample | None, fault: str | None) -> Row:
     value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
     reason = fault if reason == UNAVAILABLE and fault else reason
-    return Row(offer.signal, offer.source, signal(offer.signal).unit, offer.native_unit, value, reason)
+    return Row(offer.signal, offer.source, offer.declared.unit, offer.native_unit, value, reason)

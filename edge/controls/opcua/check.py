@@ -10,7 +10,6 @@ from edge.controls.opcua.config import Config
 from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.library import require
 from edge.errors import ConnectionLostError
-from edge.signals import signal
 from edge.sweep import Fact, Sweep
 
 T = TypeVar("T")
@@ -28,7 +27,7 @@ def describe(config: Config) -> list[Row]:
     for offer in found.offers or ():
         sample = last.get(offer.signal)
         value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
-        rows.append(Row(offer.signal, offer.source, signal(offer.signal).unit, offer.native_unit, value, reason))
+        rows.append(Row(offer.signal, offer.source, offer.declared.unit, offer.native_unit, value, reason))
     if config.source.security == "none":
         warning = 'opcua.security = "none": anyone in between can read and alter what the control says'
         rows.append(Row("(warning)", config.source.url, "", "", None, warning))
