@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from cnctwin.standins.simulated_control.state import AXES, ControlState
 
-SINUMERIK = "SinumerikVarProvider"
+SINUMERIK, SINUMERIK_OBJECT = "SinumerikVarProvider", "Sinumerik"
 CNC = "http://opcfoundation.org/UA/CNC"
 MACHINE_TOOL = "http://opcfoundation.org/UA/MachineTool/"
 MODELS = {"sinumerik": SINUMERIK, "cnc_40502": CNC, "machinetool_40501": MACHINE_TOOL}

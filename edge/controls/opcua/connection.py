@@ -13,7 +13,7 @@ import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from asyncua import ua
     from asyncua.client.client import Client
 
+    from edge.controls.opcua.event_session import EventWatch
     from edge.controls.opcua.resolve import Resolved
     from edge.controls.opcua.session import ServerStatus, Watched
 
@@ -82,6 +83,7 @@ class OpcUaConnection:
         self._heard_s = clock()
         self._failures = 0
         self._delivery: Delivery | None = None
+        self._events: EventWatch | None = None
         self._outage: tuple[str, int] | None = None
         self._started_ms = 0
         self._stamps_apart_ms: int | None = None
@@ -156,7 +158,7 @@ class OpcUaConnection:
         self.reconnects += 1
         self._failures += 1
         self.last_error = str(error)
-        delivery, self._delivery = self._delivery, None
+        delivery, self._delivery, self._events = self._delivery, None, None
         if delivery is not None and self._outage is None:
             self._outage = "session lost", delivery.heard_ms
 
@@ -180,6 +182,7 @@ class OpcUaConnection:
                     assert self._delivery is not None
                     self._hand_on(self._delivery.tick(self._now_ms(), self._clock()))
                     if self._delivery.is_open:
+                        await self._watch_events()
                         self._emit(Load(()), reading, status)
                     await asyncio.sleep(self._watch_s * self._chance.uniform(0.7, 1.0))  # never at one phase of its clock
             except session.FAILURES as error:
@@ -207,30 +210,26 @@ class OpcUaConnection:
         )
 
     async def _subscribe(self, client: "Client", nodes: "list[Resolved]", _status: "ServerStatus") -> None:
-        from edge.controls.opcua import plain, session  # noqa: PLC0415  asyncua is an extra
+        from edge.controls.opcua import event_session, session  # noqa: PLC0415  asyncua is an extra
 
-        watched: Watched | None = None
         early: list[ua.PublishResult] = []
+        there = [(one.key, one.node) for one in nodes if one.node is not None]
         elements = {one.key: one.point.element for one in nodes}
+        watched: Watched | None = None
 
         def heard(result: "ua.PublishResult") -> None:
-            if watched is None:
+            if watched is None or self._delivery is None:
                 early.append(result)  # before its handles are known
-                return
-            parts = result.NotificationMessage.NotificationData or ()
-            items = [item for part in parts for item in getattr(part, "MonitoredItems", ())]
-            values = [(watched.keys.get(int(item.ClientHandle)), item.Value) for item in items]
-            known = [(key, value) for key, value in values if key is not None and value is not None]
-            facts = tuple(
-                plain.as_fact(key, value, element=elements[key], stamps=self._config.source.timestamps) for key, value in known
-            )
-            self._compare([plain.stamps_apart_ms(value) for _, value in known])
-            overflowed = tuple(key for key, value in known if plain.overflowed(value))
-            self._heard(Notification(int(result.NotificationMessage.SequenceNumber), facts, overflowed, not parts))
+            else:
+                self._published(result, watched, elements)
 
-        there = [(one.key, one.node) for one in nodes if one.node is not None]
         watched = await session.watch(self._config, client, there, self._keep_alive_s, heard)
         faults = {one.key: one.fault for one in nodes if one.node is None} | watched.refused
+        facts = [Fact(key, fault=fault) for key, fault in faults.items()]
+        told = await event_session.listen(self._config, client, watched.subscription)
+        if told is not None:
+            self._events = event_session.EventWatch(client, watched.subscription, told, self._clock)
+            facts += filter(None, (self._events.about, await self._events.tick()))
         keep_alive_s = max(self._keep_alive_s, watched.publishing_ms / 1000)
         self._delivery = Delivery(
             items=frozenset(watched.keys.values()),
@@ -240,12 +239,33 @@ class OpcUaConnection:
             silent_s_max=KEEP_ALIVES_MISSED * keep_alive_s,
             began_ms=self._now_ms(),
             began_s=self._clock(),
-            faults=tuple(Fact(key, fault=fault) for key, fault in faults.items()),
+            faults=tuple(facts),
             outage=self._outage,
+            awaits_refresh=self._events is not None and self._events.is_waiting,
         )
         self._hand_on(self._delivery.tick(self._now_ms(), self._clock()))
         for result in early:
             heard(result)
+
+    def _published(self, result: "ua.PublishResult", watched: "Watched", elements: "Mapping[str, int | None]") -> None:
+        from edge.controls.opcua import plain  # noqa: PLC0415  asyncua is an extra
+
+        parts = result.NotificationMessage.NotificationData or ()
+        items = [item for part in parts for item in getattr(part, "MonitoredItems", ())]
+        values = [(watched.keys.get(int(item.ClientHandle)), item.Value) for item in items]
+        known = [(key, value) for key, value in values if key is not None and value is not None]
+        stamps = self._config.source.timestamps
+        facts = [plain.as_fact(key, value, element=elements[key], stamps=stamps) for key, value in known]
+        facts += [] if self._events is None else self._events.facts(parts)
+        self._compare([plain.stamps_apart_ms(value) for _, value in known])
+        overflowed = tuple(key for key, value in known if plain.overflowed(value))
+        self._heard(Notification(int(result.NotificationMessage.SequenceNumber), tuple(facts), overflowed, not parts))
+
+    async def _watch_events(self) -> None:
+        """Have the alarms repeated where that is due."""
+        fault = None if self._events is None else await self._events.tick()
+        if fault is not None:
+            self._emit(Load((fault,)))
 
     def _compare(self, apart_ms: list[int | None]) -> None:
         """Note how close the samples' stamps ever come to the server's clock; an old value may be far from it."""
@@ -255,8 +275,11 @@ class OpcUaConnection:
 
     def _heard(self, told: Notification) -> None:
         assert self._delivery is not None
-        self._heard_s = self._clock()
-        self._hand_on(self._delivery.take(told, self._now_ms(), self._clock()))
+        self._heard_s, was_open = self._clock(), self._delivery.is_open
+        loads = self._delivery.take(told, self._now_ms(), self._clock())
+        if was_open and self._events is not None and any(load.holes for load in loads):
+            self._events.missed()
+        self._hand_on(loads)
 
     def _check_silence(self) -> None:
         """A server that answers reads but publishes nothing, not even keep-alives, has lost the subscription."""
@@ -285,6 +308,8 @@ class OpcUaConnection:
         except queue.Full:
             facts = len(load.facts) + sum(hole.lost for hole in load.holes)
             since_ms = min((hole.from_ms for hole in load.holes), default=now_ms)
+            if self._events is not None:
+                self._events.missed()
             self._overflow = _Lost(since_ms, facts) if lost is None else _Lost(min(lost.from_ms, since_ms), lost.facts + facts)
         else:
             self._number += 1

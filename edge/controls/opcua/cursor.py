@@ -9,21 +9,24 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import groupby
+from typing import NamedTuple
 
-from edge.controls.opcua.config import Config, points_of
+from edge.controls.opcua.alarm_samples import KEYS, Heard, told
+from edge.controls.opcua.config import Config, is_published, points_of
 from edge.controls.opcua.point import TOOL, Point
 from edge.controls.opcua.spindle_tool import Tools, in_spindle
 from edge.controls.opcua.spindle_tool import told as tool_told
 from edge.errors import ConfigError
 from edge.place import Place
 from edge.reading import Target, bad, read_value
-from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet
+from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet, observations_of
 from edge.signals import signal
 from edge.sweep import Fact, Sweep, SweepPosition, take
 from edge.units import conversion
 from sparkplug.quality import Quality
 
 MEANINGS_MAX = 4096
+ALARM = "alarm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +42,25 @@ class Meaning:
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet)."""
+    """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
+
+    heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
+    """
 
     position: SweepPosition = field(default_factory=SweepPosition)
     meanings: tuple[Meaning, ...] = ()
     unmapped: tuple[str, ...] = ()
     tools: Tools = ()
     tool: str = "?"
+    heard: Heard = field(default_factory=Heard)
+    alarm_variable: Fact | None = None
+
+
+class _Both(NamedTuple):
+    """The samples of a frame: of variables, and of events."""
+
+    values: tuple[EdgeSample, ...]
+    events: tuple[EdgeSample, ...]
 
 
 def start(_config: Config) -> Cursor:
@@ -71,10 +86,60 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
         return replace(cursor, position=taken.position), taken.about
     is_new = sweep.life != cursor.position.life
     before = Cursor() if is_new else cursor
-    after = _learned(config, replace(before, position=taken.position), sweep.facts)
-    after, samples, dropped = _samples(config, after, sweep, taken.is_baseline)
-    offers = _offers(after) if is_new or after.meanings != before.meanings or bool(after.tools) != bool(before.tools) else None
-    return after, replace(taken.about, samples=samples, dropped=dropped, offers=offers)
+    spoken_facts = [fact for fact in sweep.facts if fact.key in KEYS]
+    values = tuple(fact for fact in sweep.facts if fact.key not in KEYS)
+    after = _learned(config, replace(before, position=taken.position), values)
+    spoken = told(after.heard, spoken_facts, sweep.t_ms, sweep.number)
+    after, found, dropped = _samples(config, after, replace(sweep, facts=values), taken.is_baseline)
+    of_all = Counter(dropped) + spoken.dropped
+    gave_up = after.heard.is_authority and not spoken.heard.is_authority
+    after = replace(after, heard=spoken.heard)
+    both = _Both(found, _published(config, spoken.samples, of_all))
+    after, samples = _one_alarm(config, after, sweep, told=both, dropped=of_all, gave_up=gave_up)
+    if not taken.is_baseline:
+        samples = tuple(sorted(samples, key=lambda sample: sample.timestamp_ms))
+    offers = _offers(config, after) if is_new or _offered(after) != _offered(before) else None
+    return after, replace(taken.about, samples=samples, dropped=dict(+of_all), offers=offers)
+
+
+def _offered(cursor: Cursor) -> tuple[object, ...]:
+    """Return what the offers depend on."""
+    return cursor.meanings, bool(cursor.tools), cursor.heard.offers(), cursor.heard.is_authority
+
+
+def _published(config: Config, events: tuple[EdgeSample, ...], dropped: Counter[str]) -> tuple[EdgeSample, ...]:
+    """Return the samples of events that the configuration does not keep back."""
+    hidden = tuple(sample for sample in events if not is_published(config, sample.signal))
+    dropped[Drop.UNMAPPED] += observations_of(hidden)
+    return tuple(sample for sample in events if sample not in hidden)
+
+
+def _one_alarm(
+    config: Config, cursor: Cursor, sweep: Sweep, *, told: _Both, dropped: Counter[str], gave_up: bool
+) -> tuple[Cursor, tuple[EdgeSample, ...]]:
+    """Let one source tell the signal `alarm`: the events where they tell all alarms, else the variable where the map has one.
+
+    gave_up: the events have just turned out not to tell all
+    """
+    newest = next((fact for fact in reversed(sweep.facts) if fact.key == ALARM), None)
+    after = replace(cursor, alarm_variable=newest or cursor.alarm_variable)
+    variable = _alarm_variable(config, after)
+    if variable is None:
+        superseded = tuple(sample for sample in told.values if sample.signal == ALARM)
+        dropped[Drop.EVIDENCE] += observations_of(superseded)
+        return after, (*(sample for sample in told.values if sample not in superseded), *told.events)
+    shown = tuple(sample for sample in told.events if sample.signal != ALARM)
+    kept = cursor.alarm_variable if gave_up and newest is None else None
+    again = () if kept is None else (replace(_sample(variable, kept, sweep), observations=0),)
+    return after, (*told.values, *again, *shown)
+
+
+def _alarm_variable(config: Config, cursor: Cursor) -> Meaning | None:
+    """Return the variable that tells the signal `alarm`; None where the events do, or where there is none."""
+    section = config.signals.get(ALARM)
+    if cursor.heard.is_authority and not (section and section.data_item):
+        return None
+    return next((meaning for meaning in cursor.meanings if meaning.target.signal == ALARM), None)
 
 
 def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
@@ -117,11 +182,17 @@ def _stands_for(template: str, key: str) -> bool:
     return re.fullmatch(re.escape(template).replace(re.escape("{name}"), r"[a-z]\d{0,2}"), key) is not None
 
 
-def _offers(cursor: Cursor) -> tuple[Offer, ...]:
-    offers = [Offer(m.target.signal, m.source, m.native_unit, m.target.low, m.target.high) for m in cursor.meanings]
+def _offers(config: Config, cursor: Cursor) -> tuple[Offer, ...]:
+    offers = {
+        m.target.signal: Offer(m.target.signal, m.source, m.native_unit, m.target.low, m.target.high) for m in cursor.meanings
+    }
     if cursor.tools:
-        offers.append(Offer("tool_number", "ToolType/Location"))
-    return tuple(offers)
+        offers["tool_number"] = Offer("tool_number", "ToolType/Location")
+    for offer in cursor.heard.offers():
+        is_ours = offer.signal not in offers or (offer.signal == ALARM and _alarm_variable(config, cursor) is None)
+        if is_ours and is_published(config, offer.signal):
+            offers[offer.signal] = offer
+    return tuple(offers.values())
 
 
 def _samples(

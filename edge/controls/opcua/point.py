@@ -90,10 +90,14 @@ class Point(_Frozen):
 
 
 class PointMap(_Frozen):
-    """A file of points. `namespace` is the model's: a server that lists it follows this map."""
+    """A file of points. `namespace` is the model's: a server that lists it follows this map.
+
+    events: the node whose events are the alarms; "" = the Server object, which has those of all
+    """
 
     title: str
     namespace: str
+    events: str = ""
     points: tuple[Point, ...]
 
 
