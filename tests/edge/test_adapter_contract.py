@@ -84,6 +84,7 @@ def test_its_sample_and_the_shared_one_name_every_key_once(adapter: Adapter) -> 
     shared = {one.name: getattr(config, one.name) for one in fields(config) if isinstance(getattr(config, one.name), Section)}
     shared = {name: section for name, section in shared.items() if name not in {"machine", "source"}}
     of_all = tomllib.loads(SHARED.read_text(encoding="utf-8"))
+    assert (of_all.pop("variables"), of_all.pop("plc")) == ({}, {}), "what is read by address is each machine's own"
     assert of_all.keys() == shared.keys(), "what one control has is in its own sample"
     tables = tomllib.loads(own) | of_all
     for name, section in (keys | shared).items():
