@@ -7,7 +7,7 @@ Everything that is not in the table is refused with EW_FUNC. There is no functio
                position 26, servo load 56, axis names 89, axis count A4, macro 15, parameter 0E and 8D, alarm messages 23,
                PMC range 8001
     reported   program text 20, spindle meter 40, date and time 45, spindle names 8A, tool offset 08, G codes 96, program names
-               B9, CF and FC, mode words 98 and E1 that go with statinfo
+               B9, CF and FC, mode words 98 and E1 that go with statinfo, list of programs 06, operator message 34
     our guess  modal 21 and tool number 22: there is no public description of their answers
 """
 
@@ -25,6 +25,8 @@ LEFT_OVER = b"\x20"
 """The bytes where there is no axis: a control sends the room for all axes, and of those it has not got what was there before."""
 MACROS_MAX = 100
 ALARM_TEXT_BYTES_MAX = 64
+MESSAGE_BYTES_MAX = 256
+WITH_COMMENT = 2
 Arguments = tuple[int, int, int, int]
 Answer = bytes | Code
 Function = Callable[[Moment, Arguments], Answer]
@@ -105,6 +107,27 @@ def _program_text(moment: Moment, arguments: Arguments) -> Answer:
     if not 1 <= arguments[0] <= 1436:
         return Code.LENGTH
     return struct.pack(">i", moment.state.line) + shown.program_text(moment, arguments[0]).encode("ascii", "replace")
+
+
+def _program_list(moment: Moment, arguments: Arguments) -> Answer:
+    """Records of number, size and comment, from the first program that is not below the number asked for."""
+    first, number_max, kind = arguments[:3]
+    if kind != WITH_COMMENT or number_max < 1:
+        return Code.ATTRIB
+    listed = sorted(number for number in moment.description.program_comments if number >= first)[:number_max]
+    return b"".join(
+        struct.pack(">II64s", number, 1, moment.description.program_comments[number].encode("ascii", "replace")[:63])
+        for number in listed
+    )
+
+
+def _operator_message(moment: Moment, _: Arguments) -> Answer:
+    """Number, type, length and text; the number -1 where there is no message."""
+    shown_now = moment.description.operator_message
+    if shown_now is None:
+        return struct.pack(">iii", -1, 0, 0)
+    text = shown_now[1].encode("ascii", "replace")[:MESSAGE_BYTES_MAX]
+    return struct.pack(">iii", shown_now[0], 0, len(text)) + text.ljust(MESSAGE_BYTES_MAX, b"\0")
 
 
 def _program_path(moment: Moment, _: Arguments) -> Answer:
@@ -255,6 +278,7 @@ def _pmc_range(moment: Moment, arguments: Arguments) -> Answer:
 
 
 FUNCTIONS: dict[tuple[int, int], Function] = {
+    (CNC, 0x06): _program_list,
     (CNC, 0x08): _tool_offsets,
     (CNC, 0x0E): _parameter_16,
     (CNC, 0x15): _macros,
@@ -270,6 +294,7 @@ FUNCTIONS: dict[tuple[int, int], Function] = {
     (CNC, 0x24): _feed,
     (CNC, 0x25): _spindle_speed,
     (CNC, 0x26): _position,
+    (CNC, 0x34): _operator_message,
     (CNC, 0x40): _spindle_meter,
     (CNC, 0x45): _date_or_time,
     (CNC, 0x56): _servo_load,

@@ -13,6 +13,8 @@ from cnctwin.standins.simulated_machine.description import PROGRAM
 
 DAY_S = 24 * 3600.0
 PORT = 8193
+TOOLS = 5
+RADIUS_WEAR, RADIUS, LENGTH_WEAR, LENGTH = range(4)  # the kinds of `cnc_rdtofs`
 
 
 def simulate_focas(
@@ -31,14 +33,30 @@ def simulate_focas(
     if not 0 < speed <= 1000:
         raise UsageError(f"--speed {speed:g} is not between 0 and 1000; 1 is real time")
     control = SimulatedControl(coded(production(DAY_S)), speed=speed, clock_offset_s=clock_offset_s)
-    lines = tuple(PROGRAM.read_text(encoding="utf-8").splitlines())
-    server = FocasServer(control, ControlDescription(has_tool_number=tool_number, program_lines=lines), port=port)
+    server = FocasServer(control, described(has_tool_number=tool_number), port=port)
     with server:
         print(f"{server.url} shows a FANUC control, which runs {PROGRAM.name}; Ctrl-C ends it", flush=True)
         while not stop.wait(STATE_S):
             _keep(state_file, server, control)
         _keep(state_file, server, control)
     print(", ".join(f"{name} {count}" for name, count in server.ledger.as_dict().items()), flush=True)
+
+
+def described(*, has_tool_number: bool = False) -> ControlDescription:
+    """Return the control as the shop has set it up: its tools are measured, the program has its comment in its head."""
+    lines = tuple(PROGRAM.read_text(encoding="utf-8").splitlines())
+    head = next(line for line in lines if line.startswith("O"))
+    name, _, comment = head.partition(" ")
+    lengths = {(tool, LENGTH): 120.0 + 7.5 * tool for tool in range(1, TOOLS + 1)}
+    wear = {(tool, LENGTH_WEAR): -0.01 * tool for tool in range(1, TOOLS + 1)}
+    return ControlDescription(
+        has_tool_number=has_tool_number,
+        program_lines=lines,
+        program_comments={int(name.removeprefix("O")): comment.strip("()")},
+        operator_message=(2001, "CHECK COOLANT LEVEL"),
+        macros={500: 80.0, 501: 50.0},
+        tool_offsets_mm={**lengths, **wear, (TOOLS, RADIUS): 6.0, (TOOLS, RADIUS_WEAR): 0.005},
+    )
 
 
 def _keep(state_file: Path | None, server: FocasServer, control: SimulatedControl) -> None:

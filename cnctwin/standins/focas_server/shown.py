@@ -16,7 +16,7 @@ from cnctwin.standins.simulated_control.state import ControlState
 _MODES = {"MANUAL_DATA_INPUT": 0, "AUTOMATIC": 1, "SEMI_AUTOMATIC": 1, "EDIT": 3, "MANUAL": 5}
 _RUNS = {"ACTIVE": 3, "FEED_HOLD": 2, "INTERRUPTED": 2, "STOPPED": 1, "PROGRAM_STOPPED": 1, "OPTIONAL_STOP": 1}
 _COMMENT = re.compile(r"\([^)]*\)?")
-_WORD = re.compile(r"(?<![A-Z#\[])([MTSFG])(\d{1,6})")
+_WORD = re.compile(r"(?<![A-Z#\[])([MTSFGHD])(\d{1,6})")
 _GROUPS = ((0, 1, 2, 3), (17, 18, 19), (90, 91))  # G codes of the groups 0, 1, 2 as `cnc_rdgcode` numbers them
 _RAPID_OVERRIDE_CODES = ((100.0, 0), (50.0, 1), (25.0, 2))  # ROV2, ROV1; anything less is F0
 PMC_BYTES = {0: 768, 1: 768, 2: 128, 3: 128, 4: 125, 5: 8000, 6: 500, 7: 100, 8: 400, 9: 10_000}
@@ -35,6 +35,8 @@ class ControlDescription:
     max_axis: how many axes it has room for; answers about all axes are that long
     has_tool_number: whether it has the option that `cnc_toolnum` needs
     macros: common variables that hold a value; the others are vacant
+    operator_message: number and text, None where there is none
+    program_comments: what stands in the heads of the programs, by number
     tool_offsets_mm: by tool and kind (0 radius wear, 1 radius, 2 length wear, 3 length)
     program_lines: the text that blocks come from; what follows the running block is shown with it
     """
@@ -51,17 +53,21 @@ class ControlDescription:
     macros: dict[int, float] = field(default_factory=dict)
     tool_offsets_mm: dict[tuple[int, int], float] = field(default_factory=dict)
     tools_max: int = 400
+    operator_message: tuple[int, str] | None = None
+    program_comments: dict[int, str] = field(default_factory=dict)
     program_lines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Codes:
-    """The modal codes: of M, T, S, F, and of the first three groups of G."""
+    """The modal codes: of M, T, S, F, H, D, and of the first three groups of G."""
 
     m_code: int = 30
     t_code: int = 0
     s_code: int = 0
     f_code: int = 0
+    h_code: int = 0
+    d_code: int = 0
     g_codes: tuple[int, int, int] = (0, 17, 90)
 
 
@@ -163,7 +169,9 @@ def macro(moment: Moment, number: int) -> float | None:
         3011: now.year * 10_000 + now.month * 100 + now.day,
         3012: now.hour * 10_000 + now.minute * 100 + now.second,
         3901: state.part_count,
+        4107: codes.d_code,
         4109: codes.f_code,
+        4111: codes.h_code,
         4113: codes.m_code,
         4114: state.line,
         4115: program_number(state),

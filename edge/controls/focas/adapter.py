@@ -9,6 +9,7 @@ Documentation: docs/edge-focas.md. Every key of the configuration: focas.toml be
 from pathlib import Path
 
 from edge.adapter import Adapter
+from edge.controls.focas.address import address_of
 from edge.controls.focas.check import describe
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.connection import FocasConnection
@@ -27,4 +28,5 @@ ADAPTER = Adapter(
     describe=describe,
     draft=draft,
     sample_config=Path(__file__).with_name("focas.toml"),
+    address=address_of,
 )

@@ -1,27 +1,42 @@
 """The commands of the Ethernet protocol that a call needs, and what their answers hold. No I/O.
 
-Two calls have no published command: cnc_modal and cnc_toolnum. The modal M, S, T and F are read from the system variables that
-FANUC's manuals define for them (#4113, #4119, #4120, #4109), whose reading is known from captures; cnc_toolnum is answered here
-with EW_FUNC, so the tool number comes from the T code.
+Several calls have no command that is known with confidence: cnc_modal, cnc_toolnum, tool life and alarm history. The modal M, S,
+T, F, H and D are read from the system variables that FANUC's manuals define for them (#4113, #4119, #4120, #4109, #4111, #4107),
+whose reading is known from captures; the others are answered here with EW_FUNC, so the tool number comes from the T code.
 """
 
 import struct
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from edge.alarm_list import ListedAlarm
 from edge.controls.focas import wire
-from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, FocasValue, Identity, Request, alarm_text
+from edge.controls.focas.calls import (
+    CLOCK_WORDS,
+    OFFSET_KINDS,
+    STATUS_WORDS,
+    Answer,
+    Call,
+    FocasValue,
+    Identity,
+    Request,
+    alarm_code,
+    alarm_values,
+)
 from edge.controls.focas.pmc import AREAS, pmc_address
-from edge.controls.focas.policy import DATA, FUNC, OK, told
+from edge.controls.focas.policy import DATA, FUNC, NUMBER, OK, told
 from edge.controls.focas.wire import PMC, Block, Reply
 from edge.errors import DocumentError
 
 BLOCK_CHARS = 256
 ALARMS_MAX = 10
 ALARM_CHARS = 64
-LENGTH_GEOMETRY = 1003
-_MODAL_FIRST, _MODAL_LAST = 4109, 4120
-_MODAL_NUMBERS = {"M": 4113, "S": 4119, "T": 4120, "F": 4109}
+OFFSET_BASE = 1000  # what the library adds to the kind of an offset on its way to the control
+PROGRAMS_LISTED = 19  # at once, as the library asks: it fills a frame
+PROGRAM_RECORD = struct.Struct(">II64s")
+_WITH_COMMENT = 2
+_MODAL_FIRST, _MODAL_LAST = 4107, 4120
+_MODAL_NUMBERS = {"M": 4113, "S": 4119, "T": 4120, "F": 4109, "H": 4111, "D": 4107}
 IDENTITY_BLOCKS = (Block(0x18), Block(0xA4, (2,)), Block(0x89))
 
 
@@ -63,7 +78,7 @@ def exchange(request: Request, path: int = 1) -> Exchange | None:
         case Call.BLOCK:
             return Exchange((Block(0x20, (BLOCK_CHARS,)),), BLOCK_CHARS + 24, _block)
         case Call.MODAL:
-            return Exchange((Block(0x15, (_MODAL_FIRST, _MODAL_LAST)),), 112, _modal)
+            return Exchange((Block(0x15, (_MODAL_FIRST, _MODAL_LAST)),), 128, _modal)
         case Call.PMC:
             return _pmc(request.argument)
         case Call.PROGRAM:
@@ -73,8 +88,17 @@ def exchange(request: Request, path: int = 1) -> Exchange | None:
         case Call.G_CODE:
             return Exchange((Block(0x96, (int(request.argument), 0)),), 28, _g_code(request.argument))
         case Call.OFFSET:
-            number = int(request.argument)
-            return Exchange((Block(0x08, (number, number, LENGTH_GEOMETRY)),), 24, _offset)
+            kind, _, number = request.argument.partition(" ")
+            block = Block(0x08, (int(number), int(number), OFFSET_BASE + OFFSET_KINDS[kind]))
+            return Exchange((block,), 24, _one_figure(f"offset.{kind}"))
+        case Call.MACRO:
+            number = request.argument
+            return Exchange((Block(0x15, (int(number), int(number))),), 24, _one_figure(f"macro.{number}"))
+        case Call.MESSAGE:
+            return Exchange((Block(0x34),), 300, _message)
+        case Call.COMMENT:
+            asked = (int(request.argument), PROGRAMS_LISTED, _WITH_COMMENT)
+            return Exchange((Block(0x06, asked),), 16 + PROGRAMS_LISTED * PROGRAM_RECORD.size, _comment(int(request.argument)))
         case Call.CLOCK:
             return Exchange((Block(0x45, (0,)), Block(0x45, (1,))), 60, _clock)
     return None
@@ -156,13 +180,13 @@ def _modal(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
 
 
 def _pmc(address: str) -> Exchange:
-    area, byte, _, width = pmc_address(address)
+    area, byte, _, width, is_signed = pmc_address(address)
 
     def read(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
         data = found[0].data
         if len(data) != width:
             raise DocumentError(f"{len(data)} bytes of the PMC in place of {width}")
-        return (FocasValue(f"pmc.{address}", int.from_bytes(data, "little")),)
+        return (FocasValue(f"pmc.{address}", int.from_bytes(data, "little", signed=is_signed)),)
 
     return Exchange((Block(0x8001, (byte, byte + width - 1, AREAS[area], 0), PMC),), 16 + width, read)
 
@@ -176,13 +200,32 @@ def _program(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
 
 
 def _alarms(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
-    data, texts = found[0].data, list[str]()
+    data, alarms = found[0].data, list[ListedAlarm]()
     record = 16 + ALARM_CHARS
     for at in range(0, len(data) - record + 1, record):
         number, kind, _, length = struct.unpack_from(">4i", data, at)
         message = wire.text(data[at + 16 : at + 16 + max(0, min(length, ALARM_CHARS))])
-        texts.append(alarm_text(kind, number, message))
-    return (FocasValue("alarms", "; ".join(texts)),)
+        alarms.append(ListedAlarm(alarm_code(kind, number), message, active=True))
+    return alarm_values(alarms)
+
+
+def _message(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
+    """Number, type, length and text, like an alarm but for its axis; no data, or the number -1, is no message."""
+    data = found[0].data
+    number, _, length = struct.unpack_from(">3i", data) if data else (-1, 0, 0)
+    return (FocasValue("operator_message", "" if number == -1 else wire.text(data[12 : 12 + max(0, length)])),)
+
+
+def _comment(number: int) -> Callable[[Sequence[Reply], Identity], tuple[FocasValue, ...]]:
+    """The list of programs begins with the one asked for, or with the next that there is."""
+
+    def read(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
+        listed, _, comment = PROGRAM_RECORD.unpack_from(found[0].data)
+        if listed != number:
+            return (FocasValue("program.comment", None, NUMBER),)
+        return (FocasValue("program.comment", wire.text(comment)),)
+
+    return read
 
 
 def _g_code(group: str) -> Callable[[Sequence[Reply], Identity], tuple[FocasValue, ...]]:
@@ -193,8 +236,13 @@ def _g_code(group: str) -> Callable[[Sequence[Reply], Identity], tuple[FocasValu
     return read
 
 
-def _offset(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
-    return _row(("tool_offset",), found[0])
+def _one_figure(key: str) -> Callable[[Sequence[Reply], Identity], tuple[FocasValue, ...]]:
+    """One value of 8 bytes; the control's mark of "no value" is a null without a code."""
+
+    def read(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
+        return (FocasValue(key, wire.value(found[0].data[:8])),)
+
+    return read
 
 
 def _clock(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple, Protocol
 
+from edge.alarm_list import ListedAlarm, alarms_text
 from edge.sweep import Plain
 
 
@@ -27,15 +28,22 @@ class Call(StrEnum):
     G_CODE = "cnc_rdgcode"
     OFFSET = "cnc_rdtofs"
     CLOCK = "cnc_gettimer"
+    MESSAGE = "cnc_rdopmsg"
+    MACRO = "cnc_rdmacro"
+    COMMENT = "cnc_rdprogdir3"
+    LIFE = "cnc_rdlife"
+    HISTORY = "cnc_rdalmhistry"
 
 
 STATUS_WORDS = ("aut", "run", "motion", "mstb", "emergency", "alarm", "edit")
-MODAL_WORDS = {"M": 106, "S": 107, "T": 108, "F": 103}  # the number of the modal datum in cnc_modal
+MODAL_WORDS = {"M": 106, "S": 107, "T": 108, "F": 103, "H": 104, "D": 101}  # the number of the modal datum in cnc_modal
+OFFSET_KINDS = {"radius_wear": 0, "radius": 1, "length_wear": 2, "length": 3}  # of a machining centre, in cnc_rdtofs
+LIFE_WORDS = ("used", "limit")
 CLOCK_WORDS = ("year", "month", "day", "hour", "minute", "second")
 
 
 class Request(NamedTuple):
-    """One call. `argument`: a PMC address, a G group, the number of an offset."""
+    """One call. `argument`: a PMC address, a G group, kind and number of an offset, the number of a variable or a program."""
 
     call: Call
     argument: str = ""
@@ -113,7 +121,13 @@ def keys_of(request: Request, axes: Sequence[str]) -> tuple[str, ...]:
         case Call.G_CODE:
             return (f"modal.G{request.argument}",)
         case Call.OFFSET:
-            return ("tool_offset",)
+            return (f"offset.{request.argument.partition(' ')[0]}",)
+        case Call.MACRO:
+            return (f"macro.{request.argument}",)
+        case Call.ALARMS:
+            return ("alarms", "alarm_list")
+        case Call.LIFE:
+            return tuple(f"life.{word}" for word in LIFE_WORDS)
         case Call.CLOCK:
             return tuple(f"clock.{word}" for word in CLOCK_WORDS)
     return (_LONE[request.call],)
@@ -124,18 +138,26 @@ _LONE = {
     Call.BLOCK: "block",
     Call.TOOL: "tool",
     Call.PROGRAM: "program.name",
-    Call.ALARMS: "alarms",
+    Call.MESSAGE: "operator_message",
+    Call.COMMENT: "program.comment",
+    Call.HISTORY: "alarm_history",
 }
 
 
 ALARM_LETTERS = ("SW", "PW", "IO", "PS", "OT", "OH", "SV", "SR", "MC", "SP", "DS", "IE", "BG", "SN", "", "EX", "", "", "", "PC")
 
 
-def alarm_text(kind: int, number: int, text: str) -> str:
-    """An alarm as the control's screen names it (series 30i and 0i-D to 0i-F; of older ones the letters may differ).
+def alarm_code(kind: int, number: int) -> str:
+    """An alarm's code as the control's screen shows it (series 30i and 0i-D to 0i-F; of older ones the letters may differ).
 
-    >>> alarm_text(3, 10, "IMPROPER G-CODE")
-    'PS0010 IMPROPER G-CODE'
+    >>> alarm_code(3, 10)
+    'PS0010'
     """
     letters = ALARM_LETTERS[kind] if 0 <= kind < len(ALARM_LETTERS) else ""
-    return f"{letters or f'type {kind} '}{number:04d} {text}".strip()
+    return f"{letters or f'type {kind} '}{number:04d}"
+
+
+def alarm_values(alarms: Sequence[ListedAlarm]) -> tuple[FocasValue, FocasValue]:
+    """Both facts of the active alarms: the text that a person reads, and the list."""
+    texts = (f"{alarm.code} {alarm.text}".strip() for alarm in alarms)
+    return FocasValue("alarms", "; ".join(texts)), FocasValue("alarm_list", alarms_text(alarms))

@@ -27,6 +27,14 @@ class ToolSource(StrEnum):
     MODAL_AT_CHANGE = "modal_at_change"  # the T code at the last tool change: programs that call the next tool ahead
 
 
+class LifeUnit(StrEnum):
+    """The unit in which the control counts tool life. Its screen tells; the functions do not."""
+
+    UNKNOWN = ""  # then tool life is not read
+    MINUTES = "minutes"
+    USES = "uses"
+
+
 class Group(StrEnum):
     """Groups of values that can be left out, to ask the control less."""
 
@@ -37,6 +45,9 @@ class Group(StrEnum):
     ALARMS = "alarms"
     OFFSET = "offset"
     CLOCK = "clock"
+    MESSAGES = "messages"
+    COMMENT = "comment"
+    HISTORY = "history"
 
 
 def _address(text: str) -> PmcAddress:
@@ -71,11 +82,13 @@ class FocasConfig(Section):
     path: int = Field(default=1, ge=1, le=15)
     interval_ms: int = Field(default=200, ge=20, le=60_000)
     slow_interval_ms: int = Field(default=1000, ge=100, le=600_000)
+    rare_interval_s: float = Field(default=10.0, ge=1, le=3600)
     clock_interval_s: float = Field(default=10.0, ge=1, le=3600)
     utc_offset_min: int = Field(default=0, ge=-840, le=840)
     timeout_s: float = Field(default=2.0, ge=0.05, le=60)
     groups: frozenset[Group] = frozenset(Group)
     tool_number: ToolSource = ToolSource.AUTO
+    tool_life_unit: LifeUnit = LifeUnit.UNKNOWN
     tool_change_m_codes: tuple[Annotated[int, Field(ge=0, le=99_999_999)], ...] = Field(default=(6,), max_length=16)
     tool_change_pmc: Annotated[str, AfterValidator(_bit)] = ""
     tool_number_pmc: Annotated[str, AfterValidator(_register)] = ""
@@ -88,6 +101,10 @@ class FocasConfig(Section):
             )
         if self.backend is Backend.ETHERNET and self.tool_number is ToolSource.TOOLNUM:
             raise ValueError('tool_number = "toolnum" needs backend = "library": the protocol has no known command for it')
+        if self.backend is Backend.ETHERNET and self.tool_life_unit is not LifeUnit.UNKNOWN:
+            raise ValueError(
+                f'tool_life_unit = "{self.tool_life_unit}" needs backend = "library": no command of the protocol is known for it'
+            )
         if self.tool_change_pmc.upper().startswith(OVERRIDE_BYTES):
             raise ValueError(
                 f'tool_change_pmc = "{self.tool_change_pmc}" lies in a byte of an override; name the bit of the builder\'s ladder'

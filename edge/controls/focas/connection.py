@@ -13,10 +13,11 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 from uuid import uuid4
 
+from edge.controls.focas.address import address_of
 from edge.controls.focas.backend import backend_of
 from edge.controls.focas.calls import Answer, Call, FocasBackend, FocasValue, Identity, Request
 from edge.controls.focas.config import Config, Group
-from edge.controls.focas.plan import Refusals, quick, slow
+from edge.controls.focas.plan import Refusals, Subject, quick, rare, slow, without_offset
 from edge.controls.focas.policy import OK, PROTOCOL, Policy, policy_of, told
 from edge.sample import ClockReading
 from edge.sweep import Fact, Hole, Sweep
@@ -25,6 +26,7 @@ BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0
 HOLE_INTERVALS = 5
 CLOCK_RESOLUTION_MS = 1000
+RARE_AT_ONCE = 4  # requests that a look takes on beside its own, so that no look is late for what is rare
 
 
 class FocasConnection:
@@ -53,7 +55,9 @@ class FocasConnection:
         self._failures, self._why_lost = 0, ""
         self._heard_s, self._seen_ms = clock(), 0
         self._slow_s = self._clock_s = float("-inf")
-        self._tool, self._facts_last = 0, 0
+        self._chosen = tuple(address_of(one).request for one in config.chosen)
+        self._rare_s, self._rare = float("-inf"), tuple[Request, ...]()
+        self._subject, self._facts_last = Subject(), 0
         self.reconnects = 0
         self.last_error = ""
 
@@ -103,7 +107,8 @@ class FocasConnection:
             self._lost(opened.code, opened.why)
             return False
         self._identity, self._is_new, self._refusals = opened.identity, True, Refusals()
-        self._slow_s = self._clock_s = float("-inf")
+        self._slow_s = self._clock_s = self._rare_s = float("-inf")
+        self._rare, self._subject = (), Subject()
         return True
 
     def _lost(self, code: int, why: str = "") -> None:
@@ -124,27 +129,54 @@ class FocasConnection:
         assert self._identity is not None
         axes, now_s = self._identity.axes, self._clock()
         is_slow = self._is_new or self._is_due(self._slow_s, self._config.slow_interval_ms / 1000)
-        wanted = quick(self._config) + (slow(self._config, self._tool) if is_slow else ())
-        requests = self._refusals.asked(wanted, axes)
+        wanted = quick(self._config) + (slow(self._config, self._chosen) if is_slow else ()) + self._rare[:RARE_AT_ONCE]
+        requests = self._refusals.asked(dict.fromkeys(wanted), axes)
+        self._rare = self._rare[RARE_AT_ONCE:]
         began_ms = self._wall_ms()
         answers = self._backend.ask(requests)
         t_ms = (began_ms + self._wall_ms()) // 2
-        lost = next((answer.code for answer in answers if policy_of(answer.code) is Policy.RECONNECT), None)
-        if lost is not None or len(answers) != len(requests):
-            self._lost(PROTOCOL if lost is None else lost, _first(requests, answers))
+        found = self._judged(requests, answers)
+        told_none = () if found is None else self._turned_to(found)
+        if found is not None and self._is_new:  # the first look finds out all that there is
+            requests, self._rare = self._refusals.asked(self._rare, axes), ()
+            more = self._judged(requests, self._backend.ask(requests)) if requests else []
+            found = None if more is None else found + more
+        if found is None:
             return None
-        found = [one for pair in zip(requests, answers, strict=True) for one in self._refusals.judge(*pair, axes)]
-        self._say_refused(requests, answers)
         is_due = self._is_new or self._is_due(self._clock_s, self._config.clock_interval_s)
         clock = self._control_clock() if is_due else None
         if self._identity is None:
             return None
-        facts = (*(_identified(self._identity) if self._is_new else ()), *map(_fact, found))
+        facts = (*(_identified(self._identity) if self._is_new else ()), *map(_fact, found), *told_none)
         sweep = Sweep(self._life, self._number, t_ms, facts, self._hole(t_ms, len(facts)), self._config.interval_ms, clock, True)
+        if self._is_new:
+            self._seen_ms = self._wall_ms()  # it took longer, for all that it asked
         self._number, self._is_new = self._number + 1, False
         self._slow_s = now_s if is_slow else self._slow_s
-        self._tool = next((one.value for one in found if one.key == "modal.T" and isinstance(one.value, int)), self._tool)
         return sweep
+
+    def _judged(self, requests: Sequence[Request], answers: Sequence[Answer]) -> list[FocasValue] | None:
+        """The facts of these answers; None where the handle was lost."""
+        assert self._identity is not None
+        lost = next((answer.code for answer in answers if policy_of(answer.code) is Policy.RECONNECT), None)
+        if lost is not None or len(answers) != len(requests):
+            self._lost(PROTOCOL if lost is None else lost, _first(requests, answers))
+            return None
+        axes = self._identity.axes
+        found = [one for pair in zip(requests, answers, strict=True) for one in self._refusals.judge(*pair, axes)]
+        self._say_refused(requests, answers)
+        return found
+
+    def _turned_to(self, found: Sequence[FocasValue]) -> tuple[Fact, ...]:
+        """Plan what is rare, where it is due or the tool or program is another now; return what is known without asking."""
+        assert self._identity is not None
+        subject = Subject.after(self._subject, found)
+        if subject == self._subject and not self._is_due(self._rare_s, self._config.rare_interval_s):
+            return ()
+        self._subject, self._rare_s = subject, self._clock()
+        is_lathe = self._identity.mt_type.strip().startswith("T")
+        self._rare = rare(self._config, subject, is_lathe)
+        return without_offset(self._config, subject, is_lathe)
 
     def _is_due(self, last_s: float, interval_s: float) -> bool:
         """Return whether this look is the nearest to the end of an interval."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from edge.controls.focas.config import Config, ToolSource
-from edge.controls.focas.mapping import FocasMapping, mapping_of
+from edge.controls.focas.mapping import ChosenFact, FocasMapping, mapping_of
 from edge.controls.focas.states import cue_of, execution_of, feed_override_pct, first_line, mode_of, rapid_override_pct
 from edge.place import Place
 from edge.reading import Outcome, Target, bad, read_value
@@ -120,6 +120,7 @@ class _Look:
             target = self._target_of(fact)
             if target is not None and target.signal not in ("nc_block", "tool_number"):
                 yield self._sample(target.signal, fact, self._outcome(target, fact))
+        yield from self._chosen()
         number = tuple(self._tool_number())
         is_known = any(sample.value is not None for sample in number)
         yield from number if is_known else ()
@@ -139,7 +140,28 @@ class _Look:
                 section = self._mapping.sections.get(target.signal)
                 unit = "" if section is None else section.native_unit
                 found[target.signal] = Offer(target.signal, self._mapping.source_of(fact.key), unit)
-        return tuple(found.values())
+        offered = (one for one in self._mapping.chosen if one.fact in self._facts)
+        return (*found.values(), *(one.chosen.offer(self._mapping.source_of(one.fact)) for one in offered))
+
+    def _chosen(self) -> Iterator[EdgeSample]:
+        """Variables and PMC addresses of the configuration. A byte of which several bits are read is one observation."""
+        counted = {*self._mapping.evidence, self._mapping.rule.bit_fact, self._tool_key}
+        counted |= {key for key, fact in self._facts.items() if self._target_of(fact) is not None}
+        for one in self._mapping.chosen:
+            fact = self._facts.get(one.fact)
+            if fact is None:
+                continue
+            sample = self._sample(one.target.signal, fact, self._read(one, fact))
+            yield replace(sample, observations=0) if one.fact in counted else sample
+            counted.add(one.fact)
+
+    def _read(self, one: ChosenFact, fact: Fact) -> Outcome:
+        if fact.fault:
+            return bad(fact.fault)
+        if fact.value is None:
+            return bad(f"{UNAVAILABLE}: the variable is vacant")
+        is_bit = one.bit is not None and isinstance(fact.value, int)
+        return read_value(one.target, int(fact.value) >> (one.bit or 0) & 1 if is_bit else fact.value)
 
     def _target_of(self, fact: Fact) -> Target | None:
         """Return what a fact feeds, given which of several this control has."""
@@ -158,6 +180,8 @@ class _Look:
     def _outcome(self, target: Target, fact: Fact) -> Outcome:
         if fact.fault:
             return bad(fact.fault)
+        if fact.value is None and fact.key.startswith("life."):
+            return bad(f"{UNAVAILABLE}: no tool group is in use")
         value = self._meaning(target, fact)
         if value is None:
             return bad("F0: its speed is a parameter" if target.signal == "rapid_override_pct" else f"no meaning: {fact.value}")

@@ -13,6 +13,14 @@ from edge.sweep import Sweep
 from sparkplug.shown_address import shown_address
 
 PORT = 8193
+CHOSEN_LINES = (
+    "# What this machine keeps in variables and in its PMC, under names of your own (docs/edge-focas.md):",
+    "# [variables]",
+    '# part_width = { address = "#500", unit = "mm" }',
+    "# [plc]",
+    '# door_open = { address = "R100.3", kind = "flag" }',
+    "",
+)
 
 
 def draft(url: str, device: str = "") -> str:
@@ -63,9 +71,10 @@ def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) ->
         'backend = "ethernet"  # experimental; with your own library: backend = "library" and library = "/path/of/libfwlib32.so"',
         'tool_change_pmc = ""  # a bit that is on during a tool change, if the builder\'s ladder has one, such as "R100.3"',
         "",
+        *CHOSEN_LINES,
         "# Published:",
         *(_comment(f"  {name}") for name in signals),
-        "# Refused by the control:",
+        "# Not told now, or refused by the control:",
         *(map(_one_line, refused) if refused else ("#   nothing",)),
     ]
     return "\n".join(lines) + "\n"

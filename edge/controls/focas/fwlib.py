@@ -6,25 +6,29 @@ Only functions in `READS` are ever called: none of them writes to the control. (
 import ctypes
 import os
 from collections.abc import Callable
-from ctypes import byref, c_char, c_int16, c_long, c_uint16, sizeof
+from ctypes import byref, c_char, c_int16, c_int32, c_long, c_uint16, sizeof
 from typing import Any
 
+from edge.alarm_list import ListedAlarm, alarms_text
 from edge.controls.focas import structures as st
 from edge.controls.focas.answers import ALARMS_MAX, BLOCK_CHARS
 from edge.controls.focas.calls import (
     CLOCK_WORDS,
+    LIFE_WORDS,
     MODAL_WORDS,
+    OFFSET_KINDS,
     STATUS_WORDS,
     Answer,
     Call,
     FocasValue,
     Identity,
     Request,
-    alarm_text,
+    alarm_code,
+    alarm_values,
     keys_of,
 )
 from edge.controls.focas.pmc import AREAS, pmc_address
-from edge.controls.focas.policy import FUNC, OK, Policy, policy_of
+from edge.controls.focas.policy import FUNC, NUMBER, OK, Policy, policy_of
 
 READS = frozenset(
     {
@@ -49,12 +53,22 @@ READS = frozenset(
         "cnc_rdgcode",
         "cnc_toolnum",
         "cnc_rdtofs",
+        "cnc_rdmacro",
+        "cnc_rdopmsg",
+        "cnc_rdprogdir3",
+        "cnc_rdusegrpid",
+        "cnc_rdlife",
+        "cnc_rdcount",
+        "cnc_rdalmhisno",
+        "cnc_rdalmhistry",
         "cnc_rdalmmsg2",
         "cnc_gettimer",
         "pmc_rdpmcrng",
     }
 )
-LENGTH_GEOMETRY = 3
+HISTORY_AT_ONCE = 10  # entries of the alarm history in one call
+HISTORY_HEAD_BYTES = 6
+MACRO_BYTES = 10
 POSITION_FIGURES = 0
 DECIMALS_USUAL = 3
 
@@ -83,6 +97,11 @@ class Fwlib:
             Call.G_CODE: self._g_code,
             Call.OFFSET: self._offset,
             Call.CLOCK: self._clock,
+            Call.MESSAGE: self._message,
+            Call.MACRO: self._macro,
+            Call.COMMENT: self._comment,
+            Call.LIFE: self._life,
+            Call.HISTORY: self._history,
         }
 
     def open(self, host: str, port: int, timeout_s: int, path: int) -> int:
@@ -216,13 +235,13 @@ class Fwlib:
         return code or (FocasValue("tool", tool.data),)
 
     def _pmc(self, request: Request) -> tuple[FocasValue, ...] | int:
-        area, byte, _, width = pmc_address(request.argument)
+        area, byte, _, width, is_signed = pmc_address(request.argument)
         data = st.IodbPmc()
         last = c_uint16(byte + width - 1)
         length = c_uint16(8 + width)
         code = self._call("pmc_rdpmcrng", c_int16(AREAS[area]), c_int16(0), c_uint16(byte), last, length, byref(data))
         raw = bytes(data)[st.IodbPmc.cdata.offset : st.IodbPmc.cdata.offset + width]
-        return code or (FocasValue(f"pmc.{request.argument}", int.from_bytes(raw, "little")),)
+        return code or (FocasValue(f"pmc.{request.argument}", int.from_bytes(raw, "little", signed=is_signed)),)
 
     def _program(self, request: Request) -> tuple[FocasValue, ...] | int:
         program = st.OdbExePrg()
@@ -233,8 +252,12 @@ class Fwlib:
         count, alarms = c_int16(ALARMS_MAX), (st.OdbAlmMsg2 * ALARMS_MAX)()
         code = self._call("cnc_rdalmmsg2", c_int16(-1), byref(count), alarms)
         told = alarms[: max(0, count.value)]
-        texts = (alarm_text(one.type, one.alm_no, _word(one.alm_msg[: max(0, one.msg_len)])) for one in told)
-        return code or (FocasValue("alarms", "; ".join(texts)),)
+        return code or alarm_values(
+            [
+                ListedAlarm(alarm_code(one.type, one.alm_no), _word(one.alm_msg[: max(0, one.msg_len)]), active=True)
+                for one in told
+            ]
+        )
 
     def _g_code(self, request: Request) -> tuple[FocasValue, ...] | int:
         count, codes = c_int16(1), (st.OdbGcd * 4)()
@@ -243,10 +266,58 @@ class Fwlib:
 
     def _offset(self, request: Request) -> tuple[FocasValue, ...] | int:
         offset = st.OdbTOfs()
-        number = c_int16(int(request.argument))
-        code = self._call("cnc_rdtofs", number, c_int16(LENGTH_GEOMETRY), c_int16(sizeof(offset)), byref(offset))
+        kind, _, number = request.argument.partition(" ")
+        which = c_int16(int(number)), c_int16(OFFSET_KINDS[kind])
+        code = self._call("cnc_rdtofs", *which, c_int16(sizeof(offset)), byref(offset))
         decimals = self._decimals[0] if self._decimals else DECIMALS_USUAL
-        return code or (FocasValue("tool_offset", _scaled(offset.data, decimals)),)
+        return code or (FocasValue(f"offset.{kind}", _scaled(offset.data, decimals)),)
+
+    def _message(self, request: Request) -> tuple[FocasValue, ...] | int:
+        message = st.OpMsg()
+        code = self._call("cnc_rdopmsg", c_int16(0), c_int16(sizeof(message)), byref(message))
+        text = "" if message.datano == -1 else _word(message.data[: max(0, message.char_num)])
+        return code or (FocasValue("operator_message", text),)
+
+    def _macro(self, request: Request) -> tuple[FocasValue, ...] | int:
+        macro = st.OdbMacro()
+        code = self._call("cnc_rdmacro", c_int16(int(request.argument)), c_int16(MACRO_BYTES), byref(macro))
+        is_vacant = macro.dec_val == -1
+        return code or (FocasValue(f"macro.{request.argument}", None if is_vacant else _scaled(macro.mcr_val, macro.dec_val)),)
+
+    def _comment(self, request: Request) -> tuple[FocasValue, ...] | int:
+        first, count, program = c_int32(int(request.argument)), c_int16(1), st.PrgDir3()
+        code = self._call("cnc_rdprogdir3", c_int16(1), byref(first), byref(count), byref(program))
+        if code != OK:
+            return code
+        is_there = count.value == 1 and program.number == int(request.argument)
+        return (FocasValue("program.comment", _word(program.comment) if is_there else None, OK if is_there else NUMBER),)
+
+    def _life(self, request: Request) -> tuple[FocasValue, ...] | int:
+        """Use and life of the tool group in use; nulls where none is."""
+        groups, counted, limit = st.OdbUseGr(), st.OdbTLife4(), st.OdbTLife4()
+        code = self._call("cnc_rdusegrpid", byref(groups))
+        if code != OK:
+            return code
+        if groups.use <= 0:
+            return tuple(FocasValue(f"life.{word}") for word in LIFE_WORDS)
+        group = c_int16(groups.use)
+        code = self._call("cnc_rdcount", group, byref(counted)) or self._call("cnc_rdlife", group, byref(limit))
+        return code or (FocasValue("life.used", int(counted.data)), FocasValue("life.limit", int(limit.data)))
+
+    def _history(self, request: Request) -> tuple[FocasValue, ...] | int:
+        """The last entries. The log is not stopped for it, which would be a change: a control that demands it refuses."""
+        number, history = c_uint16(0), st.OdbAHis()
+        code = self._call("cnc_rdalmhisno", byref(number))
+        if code != OK:
+            return code
+        if number.value == 0:
+            return (FocasValue("alarm_history", "[]"),)
+        first = max(1, number.value - HISTORY_AT_ONCE + 1)
+        length = HISTORY_HEAD_BYTES + sizeof(st.AlmHis) * (number.value - first + 1)
+        which = c_uint16(first), c_uint16(number.value), c_uint16(length)
+        code = self._call("cnc_rdalmhistry", *which, byref(history))
+        entries = history.alm_his[: number.value - first + 1]
+        return code or (FocasValue("alarm_history", alarms_text([_logged(one) for one in entries], newest_last=True)),)
 
     def _clock(self, request: Request) -> tuple[FocasValue, ...] | int:
         words = list[int]()
@@ -257,6 +328,14 @@ class Fwlib:
                 return code
             words += timer.words
         return tuple(FocasValue(f"clock.{name}", int(word)) for name, word in zip(CLOCK_WORDS, words, strict=True))
+
+
+def _logged(entry: st.AlmHis) -> ListedAlarm:
+    """An entry of the alarm history; when, as the control's calendar shows it, which has no zone."""
+    date = f"{2000 + entry.year:04d}-{entry.month:02d}-{entry.day:02d}"
+    since = f"{date}T{entry.hour:02d}:{entry.minute:02d}:{entry.second:02d}"
+    text = _word(entry.alm_msg[: max(0, entry.len_msg)])
+    return ListedAlarm(alarm_code(entry.alm_grp, entry.alm_no), text, active=None, since=since)
 
 
 def _scaled(data: int, decimals: int) -> float | int:

@@ -3,9 +3,12 @@
 import re
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import NamedTuple
 
+from edge.chosen import Chosen
 from edge.config import SignalSection
-from edge.controls.focas.config import Config, FocasConfig
+from edge.controls.focas.address import address_of
+from edge.controls.focas.config import Config, FocasConfig, LifeUnit
 from edge.controls.focas.plan import Signals, change_bit
 from edge.controls.focas.states import CueRule
 from edge.reading import Target
@@ -24,6 +27,14 @@ _PLAIN = {
     "spindle_load": ("spindle_load_pct", "cnc_rdspmeter"),
     "block": ("nc_block", "cnc_rdexecprog"),
     "alarms": ("alarm", "cnc_rdalmmsg2"),
+    "alarm_list": ("alarms", "cnc_rdalmmsg2"),
+    "alarm_history": ("alarm_history", "cnc_rdalmhistry"),
+    "operator_message": ("operator_message", "cnc_rdopmsg"),
+    "program.comment": ("program_comment", "cnc_rdprogdir3"),
+    "offset.length": ("tool_length_mm", "cnc_rdtofs of H"),
+    "offset.length_wear": ("tool_length_wear_mm", "cnc_rdtofs of H"),
+    "offset.radius": ("tool_radius_mm", "cnc_rdtofs of D"),
+    "offset.radius_wear": ("tool_radius_wear_mm", "cnc_rdtofs of D"),
     "status.aut": ("controller_mode", "cnc_statinfo aut"),
     "status.run": ("exec_state", "cnc_statinfo run"),
     "tool": ("tool_number", "cnc_toolnum"),
@@ -31,10 +42,25 @@ _PLAIN = {
 }
 
 
+_LIFE = {
+    LifeUnit.MINUTES: {"life.used": "tool_life_used_min", "life.limit": "tool_life_limit_min"},
+    LifeUnit.USES: {"life.used": "tool_life_used_count", "life.limit": "tool_life_limit_count"},
+}
+
+
+class ChosenFact(NamedTuple):
+    """A variable or PMC address of the configuration: the fact that holds it, which bit, and the signal that it feeds."""
+
+    fact: str
+    bit: int | None
+    target: Target
+    chosen: Chosen
+
+
 class FocasMapping:
     """The signals of one configuration. `register`: the fact with the builder's tool number, "" where there is none."""
 
-    def __init__(self, source: FocasConfig, sections: Iterable[tuple[str, SignalSection]]) -> None:
+    def __init__(self, source: FocasConfig, sections: Iterable[tuple[str, SignalSection]], chosen: Iterable[Chosen] = ()) -> None:
         signals, bit = Signals.of(source.path), change_bit(source)
         self.sections = dict(sections)
         self.register = f"pmc.{source.tool_number_pmc}" if source.tool_number_pmc else ""
@@ -48,6 +74,10 @@ class FocasMapping:
             rule = rule._replace(bit_fact=f"pmc.{bit.byte_name}", bit=bit.bit or 0, bit_name=source.tool_change_pmc)
         self.rule = rule
         self.evidence = tuple(key for key in rule.keys if key != self.register)
+        life = _LIFE.get(source.tool_life_unit, {})
+        self._life = {key: (name, "cnc_rdcount" if key == "life.used" else "cnc_rdlife") for key, name in life.items()}
+        addresses = [(one, address_of(one)) for one in chosen]
+        self.chosen = tuple(ChosenFact(at.fact, at.bit, one.target(at.fact), one) for one, at in addresses)
         self._targets: dict[str, Target | None] = {}
 
     def target(self, key: str) -> Target | None:
@@ -64,7 +94,8 @@ class FocasMapping:
             return f"{'cnc_rddynamic2 machine' if axis[1] == 'position' else 'cnc_rdsvmeter'} {axis[2]}"
         if key in self.overrides:
             return f"pmc_rdpmcrng {self.overrides[key][1]}"
-        return _PLAIN[key][1] if key in _PLAIN else key.replace("pmc.", "pmc_rdpmcrng ")
+        known = _PLAIN | self._life
+        return known[key][1] if key in known else key.replace("pmc.", "pmc_rdpmcrng ").replace("macro.", "cnc_rdmacro #")
 
     def _target(self, key: str) -> Target | None:
         name = self._name(key)
@@ -85,12 +116,13 @@ class FocasMapping:
         if axis := _AXIS.fullmatch(key):
             suffix = "load_pct" if axis[1] == "servo_load" else "pos_deg" if axis[2][0] in _ROTARY else "pos_mm"
             return f"axis_{axis[2].lower()}_{suffix}"
-        return _PLAIN[key][0] if key in _PLAIN else self.overrides.get(key, ("",))[0]
+        known = _PLAIN | self._life
+        return known[key][0] if key in known else self.overrides.get(key, ("",))[0]
 
 
 def mapping_of(config: Config) -> FocasMapping:
     """The mapping of this configuration; the same one as long as the configuration is."""
-    return _mapping(config.source, tuple(config.signals.items()))
+    return _mapping(config.source, tuple(config.signals.items()), config.chosen)
 
 
 _mapping = lru_cache(maxsize=256)(FocasMapping)

@@ -1,14 +1,17 @@
-"""The plan of what is asked when: at each look, once in a slow interval, and what the control has refused for good."""
+"""The plan of what is asked when: at each look, in a slow and in a rare interval, and what the control has refused for good."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from edge.controls.focas.calls import Answer, Call, FocasValue, Request, keys_of
+from edge.controls.focas.calls import OFFSET_KINDS, Answer, Call, FocasValue, Request, keys_of
 from edge.controls.focas.config import Backend, FocasConfig, Group, ToolSource
 from edge.controls.focas.pmc import PmcAddress, pmc_address
 from edge.controls.focas.policy import Policy, policy_of
+from edge.sweep import Fact, Plain
 
 G_GROUPS = ("0", "1", "2")
+OFFSET_MAX = 9999
 LOOKS_BUSY_MAX = 25  # a value that the control is too busy to give for so many looks is not known any more
 
 
@@ -63,16 +66,74 @@ def quick(config: FocasConfig) -> tuple[Request, ...]:
     return tuple(dict.fromkeys(requests))
 
 
-def slow(config: FocasConfig, tool: int) -> tuple[Request, ...]:
-    """Return what a slow look asks besides. `tool`: whose offset, 0 for none."""
+def slow(config: FocasConfig, chosen: Iterable[Request] = ()) -> tuple[Request, ...]:
+    """Return what a slow look asks besides; `chosen` are the variables and PMC addresses of the configuration."""
     requests = [Request(Call.PROGRAM)]
     if Group.ALARMS in config.groups:
         requests.append(Request(Call.ALARMS))
     if Group.MODAL in config.groups:
         requests += [Request(Call.G_CODE, group) for group in G_GROUPS]
-    if Group.OFFSET in config.groups and 0 < tool <= 9999:
-        requests.append(Request(Call.OFFSET, str(tool)))
+    if Group.MESSAGES in config.groups:
+        requests.append(Request(Call.MESSAGE))
+    return tuple(dict.fromkeys((*requests, *chosen)))
+
+
+class Subject(NamedTuple):
+    """The tool, its offsets and the program that the rare requests are about: numbers, None where they are not known."""
+
+    tool: int | None = None
+    length_offset: int | None = None
+    radius_offset: int | None = None
+    program: int | None = None
+
+    @classmethod
+    def after(cls, before: "Subject", found: Iterable[FocasValue]) -> "Subject":
+        """Return the subject that a look has shown; what it did not tell is as before.
+
+        >>> Subject.after(Subject(tool=3), [FocasValue("modal.H", 7.0)])
+        Subject(tool=3, length_offset=7, radius_offset=None, program=None)
+        """
+        told = {_SUBJECT[one.key]: _number(one.value) for one in found if one.key in _SUBJECT}
+        return before._replace(**told)
+
+
+_SUBJECT = {"modal.T": "tool", "modal.H": "length_offset", "modal.D": "radius_offset", "program.number": "program"}
+NO_OFFSET = "no offset is in force: {} 0"
+
+
+def _number(value: Plain) -> int | None:
+    is_whole = isinstance(value, int | float) and not isinstance(value, bool) and value == int(value) and 0 <= value < 10**8
+    return int(value) if is_whole and isinstance(value, int | float) else None
+
+
+def rare(config: FocasConfig, subject: Subject, is_lathe: bool) -> tuple[Request, ...]:
+    """Return what changes with the tool or the program, or hardly ever. A lathe's offsets are of its axes, and are not read."""
+    requests = list[Request]()
+    if Group.OFFSET in config.groups and not is_lathe:
+        requests += [
+            Request(Call.OFFSET, f"{kind} {number}")
+            for kind, number, _ in _offsets(subject)
+            if number is not None and 0 < number <= OFFSET_MAX
+        ]
+    if Group.COMMENT in config.groups and subject.program:
+        requests.append(Request(Call.COMMENT, str(subject.program)))
+    if config.backend is Backend.LIBRARY:
+        requests += [Request(Call.LIFE)] if config.tool_life_unit else []
+        requests += [Request(Call.HISTORY)] if Group.HISTORY in config.groups else []
     return tuple(requests)
+
+
+def without_offset(config: FocasConfig, subject: Subject, is_lathe: bool) -> tuple[Fact, ...]:
+    """Return the facts of offsets that are not asked for because H or D is 0."""
+    if Group.OFFSET not in config.groups or is_lathe:
+        return ()
+    none = [(kind, letter) for kind, number, letter in _offsets(subject) if number == 0]
+    return tuple(Fact(f"offset.{kind}", None, NO_OFFSET.format(letter)) for kind, letter in none)
+
+
+def _offsets(subject: Subject) -> tuple[tuple[str, int | None, str], ...]:
+    length, radius = (subject.length_offset, "H"), (subject.radius_offset, "D")
+    return tuple((kind, *(length if kind.startswith("length") else radius)) for kind in OFFSET_KINDS)
 
 
 @dataclass(slots=True)

@@ -1,6 +1,6 @@
 """Structures of the FOCAS library, as its public header fwlib32.h has them. Its `long` has 32 bits on every platform."""
 
-from ctypes import Structure, c_char, c_int16, c_int32
+from ctypes import Structure, c_char, c_int16, c_int32, c_uint8, c_uint16
 
 MAX_AXIS = 32
 
@@ -135,6 +135,56 @@ class OdbTOfs(Structure):
     """cnc_rdtofs"""
 
     _fields_ = (("datano", c_int16), ("type", c_int16), ("data", c_int32))
+
+
+class OdbMacro(Structure):
+    """cnc_rdmacro: value and its decimals; -1 decimals and 0 is a vacant variable"""
+
+    _fields_ = (("datano", c_int16), ("dummy", c_int16), ("mcr_val", c_int32), ("dec_val", c_int16))
+
+
+class OpMsg(Structure):
+    """cnc_rdopmsg of one message; the number -1 is none"""
+
+    _fields_ = (("datano", c_int16), ("type", c_int16), ("char_num", c_int16), ("data", c_char * 256))
+
+
+class PrgDir3(Structure):
+    """cnc_rdprogdir3 of one program"""
+
+    _fields_ = (
+        ("number", c_int32),
+        ("length", c_int32),
+        ("page", c_int32),
+        ("comment", c_char * 52),
+        ("mdate", c_int16 * 6),
+        ("cdate", c_int16 * 6),
+    )
+
+
+class OdbUseGr(Structure):
+    """cnc_rdusegrpid: tool groups, the next one, the one in use, the selected one"""
+
+    _fields_ = (("datano", c_int16), ("type", c_int16), ("next", c_int32), ("use", c_int32), ("slct", c_int32))
+
+
+class AlmHis(Structure):
+    """One entry of cnc_rdalmhistry; the year has two digits"""
+
+    _fields_ = (
+        ("dummy", c_int16),
+        ("alm_grp", c_int16),
+        ("alm_no", c_int16),
+        *((name, c_uint8) for name in ("axis_no", "year", "month", "day", "hour", "minute", "second", "dummy2")),
+        ("len_msg", c_int16),
+        ("alm_msg", c_char * 32),
+    )
+
+
+class OdbAHis(Structure):
+    """cnc_rdalmhistry of up to ten entries"""
+
+    _fields_ = (("s_no", c_uint16), ("type", c_int16), ("e_no", c_uint16), ("alm_his", AlmHis * 10))
 
 
 class IodbTimer(Structure):

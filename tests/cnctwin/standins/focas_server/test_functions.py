@@ -96,7 +96,7 @@ def test_m_stays_at_6_after_the_change_and_t_is_the_tool_called_for_next(serve: 
     assert struct.unpack(">iBBxx", m.data)[0] == 6
     assert struct.unpack(">iBBxx", t.data)[0] == 3
     assert struct.unpack(">7H", mstb.data)[3] == 0
-    assert figures(macros.data, 12) == [0, None, None, None, 6, 2, 1701, None, None, None, 0, 3]
+    assert figures(macros.data, 12) == [0, None, 0, None, 6, 2, 1701, None, None, None, 0, 3]
 
 
 def test_the_tool_number_is_an_option(serve: Serve) -> None:
@@ -262,3 +262,11 @@ def test_what_has_no_room_in_the_frame_is_refused_and_the_rest_is_answered(serve
     with RawClient(serve().port) as client:
         answers = ask(client, *[(CNC, 0x26, 1, -1)] * 20, (CNC, 0x1D))
     assert [block.code for block in answers] == [0] * 12 + [2] * 8 + [0]
+
+
+def test_the_list_of_programs_begins_with_the_next_that_there_is(serve: Serve) -> None:
+    description = ControlDescription(program_comments={1701: "BASE PLATE", 1800: "BRACKET"}, operator_message=(2001, "COOLANT"))
+    with RawClient(serve(ControlState(), description=description).port) as client:
+        listed, message = ask(client, (CNC, 0x06, 1702, 19, 2), (CNC, 0x34))
+    assert struct.unpack(">II64s", listed.data)[::2] == (1800, b"BRACKET".ljust(64, b"\0"))
+    assert struct.unpack_from(">iii7s", message.data) == (2001, 0, 7, b"COOLANT")

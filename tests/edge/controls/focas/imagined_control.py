@@ -1,20 +1,23 @@
 """A backend without any way to any control: it answers what a test tells it to, and keeps the machine's time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 
+from pydantic import TypeAdapter
+
+from edge.chosen import PlcAddresses, Variables
 from edge.config import EdgeConfig
 from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, FocasValue, Identity, Opened, Request, keys_of
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.connection import FocasConnection
-from edge.sweep import Sweep
+from edge.sweep import Plain, Sweep
 
 WHO = Identity("31", "M", "G421", "40.1", ("X", "B"))
 T0_S = 1_700_000_000.0
 
 
-def shown(request: Request) -> tuple[FocasValue, ...]:
-    """What a control shows that cuts."""
+def shown(request: Request, otherwise: Mapping[str, Plain]) -> tuple[FocasValue, ...]:
+    """What a control shows that cuts, but for what is shown otherwise."""
     values: dict[str, str | int | float | None] = dict(
         zip((f"status.{word}" for word in STATUS_WORDS), (1, 3, 1, 0, 0, 0, 0), strict=True)
     )
@@ -26,16 +29,22 @@ def shown(request: Request) -> tuple[FocasValue, ...]:
         "modal.G1": "G17",
         "modal.G2": "G90",
     }
-    values |= {"pmc.G12": 155, "pmc.F10:4": 3, "modal.M": 3, "modal.T": 7}
+    values |= {"pmc.G12": 155, "pmc.F10:4": 3, "modal.M": 3, "modal.T": 7, "modal.H": 7, "modal.D": 27, "program.number": 1701}
     values |= dict(zip((f"clock.{word}" for word in CLOCK_WORDS), (2023, 11, 14, 22, 13, 21), strict=True))
+    values |= otherwise
     return tuple(FocasValue(key, values.get(key, 0)) for key in keys_of(request, WHO.axes))
 
 
 class ImaginedControl:
-    """`fails`: what a call answers in place of values, by its name; `refuses`: what the next openings answer."""
+    """`fails`: what a call answers in place of values, by its name; `refuses`: what the next openings answer; `shows`: facts."""
 
-    def __init__(self, **options: object) -> None:
-        self.config = EdgeConfig(source=FocasConfig.model_validate(options))
+    def __init__(self, *, variables: object = None, plc: object = None, **options: object) -> None:
+        self.config = EdgeConfig(
+            source=FocasConfig.model_validate(options),
+            variables=TypeAdapter(Variables).validate_python(variables or {}),
+            plc=TypeAdapter(PlcAddresses).validate_python(plc or {}),
+        )
+        self.shows: dict[str, Plain] = {}
         self.fails: dict[str, int] = {}
         self.refuses: list[int] = []
         self.asked: list[list[str]] = []
@@ -58,7 +67,7 @@ class ImaginedControl:
         self.before_ask()
         self.asked.append([request.name for request in requests])
         self.now_s += self.call_s
-        return tuple(Answer(self.fails[r.name]) if r.name in self.fails else Answer(0, shown(r)) for r in requests)
+        return tuple(Answer(self.fails[r.name]) if r.name in self.fails else Answer(0, shown(r, self.shows)) for r in requests)
 
     def close(self) -> None:
         self.closed += 1

@@ -35,6 +35,22 @@ typedef struct {
 } IODBTIMER;
 typedef struct { char name, suff; } ODBAXISNAME;
 typedef struct { int16_t type_a, type_d, datano_s, datano_e; union { char cdata[5]; } u; } IODBPMC;
+typedef struct { int16_t datano, dummy; int32_t mcr_val; int16_t dec_val; } ODBM;
+typedef struct { int16_t datano, type, char_num; char data[256]; } OPMSG;
+typedef struct {
+    int32_t number, length, page;
+    char comment[52];
+    struct { int16_t year, month, day, hour, minute, dummy; } mdate, cdate;
+} PRGDIR3;
+typedef struct { int16_t datano, type; int32_t next, use, slct; } ODBUSEGR;
+typedef struct { int16_t datano, type; int32_t data; } ODBTLIFE3;
+typedef struct {
+    int16_t dummy, alm_grp, alm_no;
+    char axis_no, year, month, day, hour, minute, second, dummy2;
+    int16_t len_msg;
+    char alm_msg[32];
+} ALM_HIS;
+typedef struct { uint16_t s_no; int16_t type; uint16_t e_no; ALM_HIS alm_his[10]; } ODBAHIS;
 
 static const int32_t MACHINE[3] = {-399311, -248315, -386000};
 static const char AXES[4] = "XYZ";
@@ -150,7 +166,7 @@ int16_t cnc_modal(uint16_t h, int16_t type, int16_t block, ODBMDL *out) {
     (void)h; TOLD("cnc_modal");
     if (block != 0 || type < 100 || type > 126) return 3;
     memset(out, 0, sizeof *out);
-    out->datano = type; out->modal.aux.aux_data = type == 106 ? 6 : type == 108 ? 2 : type == 107 ? 8500 : 3000;
+    out->datano = type; out->modal.aux.aux_data = type == 106 ? 6 : type == 108 ? 2 : type == 107 ? 8500 : type == 104 ? 17 : type == 101 ? 27 : 3000;
     return 0;
 }
 int16_t cnc_rdgcode(uint16_t h, int16_t group, int16_t block, int16_t *count, ODBGCD *out) {
@@ -167,6 +183,7 @@ int16_t cnc_toolnum(uint16_t h, int16_t group, int16_t use, ODBTLIFE4 *out) {
 int16_t cnc_rdtofs(uint16_t h, int16_t number, int16_t type, int16_t length, ODBTOFS *out) {
     (void)h; TOLD("cnc_rdtofs");
     if (length != 8) return 2;
+    if (number < 1 || type < 0 || type > 3) return 4;
     out->datano = number; out->type = type; out->data = 101250;
     return 0;
 }
@@ -188,6 +205,63 @@ int16_t pmc_rdpmcrng(uint16_t h, int16_t area, int16_t kind, uint16_t from, uint
     memset(out, 0, sizeof *out);
     out->type_a = area; out->datano_s = (int16_t)from; out->datano_e = (int16_t)to;
     if (area == 0) out->u.cdata[0] = (char)(from == 12 ? 155 : from == 14 ? 0 : from == 30 ? 120 : 0);
+    if (area == 9) { out->u.cdata[0] = (char)0xFE; out->u.cdata[1] = (char)0xFF; }
     if (area == 1) out->u.cdata[0] = (char)(from == 7 ? 1 : from == 10 ? 6 : 0);
+    return 0;
+}
+int16_t cnc_rdmacro(uint16_t h, int16_t number, int16_t length, ODBM *out) {
+    (void)h; TOLD("cnc_rdmacro");
+    if (length != 10) return 2;
+    memset(out, 0, sizeof *out);
+    out->datano = number;
+    if (number == 500) { out->mcr_val = 80125; out->dec_val = 3; } else out->dec_val = -1;
+    return 0;
+}
+int16_t cnc_rdopmsg(uint16_t h, int16_t type, int16_t length, OPMSG *out) {
+    (void)h; TOLD("cnc_rdopmsg");
+    if (type != 0 || length != 6 + 256 || sizeof *out != 262) return 2;
+    memset(out, 0, sizeof *out);
+    out->datano = 2001; out->char_num = 13; strcpy(out->data, "CHECK COOLANT and junk");
+    return 0;
+}
+int16_t cnc_rdprogdir3(uint16_t h, int16_t type, int32_t *top, int16_t *count, PRGDIR3 *out) {
+    (void)h; TOLD("cnc_rdprogdir3");
+    if (type != 1 || *count != 1) return 4;
+    memset(out, 0, sizeof *out);
+    out->number = *top <= 1701 ? 1701 : 9001; strcpy(out->comment, "BASE PLATE");
+    return 0;
+}
+int16_t cnc_rdusegrpid(uint16_t h, ODBUSEGR *out) {
+    const char *none = getenv("STUB_FWLIB_NO_GROUP");
+    (void)h; TOLD("cnc_rdusegrpid");
+    memset(out, 0, sizeof *out);
+    out->next = 4; out->use = none ? 0 : 3; out->slct = 3;
+    return 0;
+}
+int16_t cnc_rdlife(uint16_t h, int16_t group, ODBTLIFE3 *out) {
+    (void)h; TOLD("cnc_rdlife");
+    if (group != 3) return 3;
+    memset(out, 0, sizeof *out); out->datano = group; out->data = 60;
+    return 0;
+}
+int16_t cnc_rdcount(uint16_t h, int16_t group, ODBTLIFE3 *out) {
+    (void)h; TOLD("cnc_rdcount");
+    if (group != 3) return 3;
+    memset(out, 0, sizeof *out); out->datano = group; out->data = 37;
+    return 0;
+}
+int16_t cnc_rdalmhisno(uint16_t h, uint16_t *number) { (void)h; TOLD("cnc_rdalmhisno"); *number = 12; return 0; }
+int16_t cnc_rdalmhistry(uint16_t h, uint16_t first, uint16_t last, uint16_t length, ODBAHIS *out) {
+    (void)h; TOLD("cnc_rdalmhistry");
+    if (first != 3 || last != 12 || length != 6 + 48 * 10 || sizeof *out != 486) return 2;
+    memset(out, 0, sizeof *out);
+    for (int at = 0; at < 10; ++at) {
+        ALM_HIS *one = &out->alm_his[at];
+        one->alm_grp = at < 9 ? 4 : 6; one->alm_no = at < 9 ? 500 : 401;
+        one->year = 26; one->month = 5; one->day = (char)(at < 9 ? 13 : 14);
+        one->hour = (char)(at < 9 ? 22 : 9); one->minute = (char)(at < 9 ? 4 : 30); one->second = (char)(at < 9 ? 5 : 15);
+        one->len_msg = (int16_t)(at < 9 ? 13 : 11);
+        memcpy(one->alm_msg, at < 9 ? "+X OVERTRAVEL and junk" : "SERVO ALARM and junk", 20);
+    }
     return 0;
 }

@@ -1,11 +1,14 @@
 """What `edge check` and `edge discover` say of a control, on our own server."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from cnctwin.standins.focas_server.serve import described
 from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.shown import CodedState
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import ControlState
 from edge.config import EdgeConfig
@@ -28,6 +31,52 @@ def test_check_shows_each_signal_its_function_and_that_the_way_is_experimental(s
     assert rows["spindle_rpm"].source == "experimental ethernet: cnc_acts"
     assert rows["axis_z_pos_mm"].source.endswith("cnc_rddynamic2 machine Z")
     assert {"tool_number", "nc_block", "program", "alarm", "feed_override_pct"} <= rows.keys()
+
+
+def test_check_shows_what_the_configuration_chose_and_the_tool_in_force_over_the_real_wire() -> None:
+    tool = CodedState(exec_state="ACTIVE", program="O1701", t_code=2, h_code=2, alarm=(1005, "DOOR OPEN"))
+    text = """
+[machine]
+adapter = "focas"
+[focas]
+port = {port}
+[variables]
+part_width = {{ address = "#500", unit = "mm" }}
+vacant = {{ address = "#510" }}
+[plc]
+spindle_tool = {{ address = "D100:2" }}
+changing = {{ address = "R100.0", kind = "flag" }}
+"""
+    with FocasServer(SimulatedControl([tool]), described()) as server:
+        config = parse(text.format(port=server.port), Path("edge.toml"))
+        rows = {row.signal: row for row in describe(config)}
+    shown = {name: (row.value, row.unit) for name, row in rows.items()}
+    assert shown["tool_length_mm"] == (135.0, "mm")
+    assert shown["tool_length_wear_mm"] == (-0.02, "mm")
+    assert shown["tool_radius_mm"] == (None, "mm")
+    assert rows["tool_radius_mm"].reason == "no offset is in force: D 0"
+    assert shown["operator_message"] == ("CHECK COOLANT LEVEL", "")
+    assert str(shown["program_comment"][0]).startswith("BASE PLATE")
+    assert json.loads(str(shown["alarms"][0]))[0]["code"] == "EX1005"
+    assert (shown["variable_part_width"], shown["plc_changing"]) == ((80.0, "mm"), (False, ""))
+    assert rows["variable_vacant"].reason == "unavailable: the variable is vacant"
+    assert "alarm_history" not in rows  # no command is known for it
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('[plc]\nx = { address = "Q100" }', "plc.x.address: 'Q100' is no PMC address; write R100"),
+        ('[variables]\nx = { address = "R1" }', "variables.x.address: 'R1' is no macro variable; write #500"),
+        ('[plc]\nX = { address = "R100" }', "plc.X"),
+        ('[plc]\nx = { address = "R1.0", kind = "flag", unit = "bar" }', "is a flag with a unit or a scale"),
+    ],
+)
+def test_an_address_or_name_that_cannot_be_is_refused_before_any_connection(table: str, message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(f'[machine]\nadapter = "focas"\n{table}\n', Path("edge.toml"))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_check_shows_what_the_control_refuses(server: FocasServer) -> None:

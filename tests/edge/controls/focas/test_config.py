@@ -14,7 +14,7 @@ from edge.errors import ConfigError
         ('backend = "library"', 'backend = "library" needs library = "/path/of/libfwlib32.so"'),
         ('tool_number = "toolnum"', 'needs backend = "library"'),
         ('tool_change_pmc = "R100"', "'R100' names no bit; write it as R100.0"),
-        ('tool_change_pmc = "Q1.0"', "'Q1.0' is no PMC address; write R100, R100.3 or D100:2"),
+        ('tool_change_pmc = "Q1.0"', "'Q1.0' is no PMC address; write R100, R100.3, D100:2 or D100:2s"),
         ('tool_change_pmc = "g12.3"', 'tool_change_pmc = "G12.3" lies in a byte of an override'),
         ('tool_number_pmc = "D100.1"', "'D100.1' is one bit; name a byte"),
         ('host = "http://x"', "focas.host = 'http://x'"),

@@ -165,11 +165,37 @@ def test_a_calendar_that_shows_no_time_gives_no_reading(words: list[int]) -> Non
     assert not calendar_ms(words, 0)
 
 
-def test_the_offset_of_the_tool_is_asked_with_the_slow_ones() -> None:
+def test_the_first_look_asks_all_that_is_rare_and_later_ones_a_few_at_a_time() -> None:
     control = ImaginedControl()
-    control.looks(8)
-    assert times_asked(control, Call.OFFSET) == 1
-    assert "cnc_rdtofs 7" in control.asked[6]
+    (first,) = control.looks(1)
+    kinds = {"offset.length", "offset.length_wear", "offset.radius", "offset.radius_wear"}
+    assert kinds | {"program.comment"} <= facts(first).keys()
+    control.shows["modal.H"] = 8
+    control.looks(5)
+    asked = [
+        [name for name in names if name.startswith(("cnc_rdtofs", "cnc_rdprogdir3"))] for names in control.asked[4:]
+    ]  # from the look after the one that shows it
+    assert asked == [
+        ["cnc_rdtofs radius_wear 27", "cnc_rdtofs radius 27", "cnc_rdtofs length_wear 8", "cnc_rdtofs length 8"],
+        ["cnc_rdprogdir3 1701"],
+        [],
+        [],
+    ]
+
+
+def test_an_offset_that_is_not_in_force_is_a_null_with_the_reason() -> None:
+    control = ImaginedControl()
+    control.shows["modal.H"] = 0
+    (first,) = control.looks(1)
+    faults = {fact.key: fact.fault for fact in first.facts}
+    assert (faults["offset.length"], faults["offset.radius"]) == ("no offset is in force: H 0", "")
+
+
+def test_chosen_variables_and_addresses_are_asked_with_the_slow_ones() -> None:
+    control = ImaginedControl(variables={"width": {"address": "#500"}}, plc={"door": {"address": "R100.3", "kind": "flag"}})
+    control.looks(6)
+    assert [times_asked(control, call) for call in (Call.MACRO, Call.MESSAGE)] == [2, 2]
+    assert sum("pmc_rdpmcrng R100" in asked for asked in control.asked) == 2
 
 
 def test_closing_ends_the_frames_at_once_whatever_they_wait_for() -> None:

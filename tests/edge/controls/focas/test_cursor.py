@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from edge.chosen import PlcSection, VariableSection
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.cursor import Cursor, parse, start
@@ -11,6 +12,7 @@ from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample, SampleSet
 from edge.sweep import Fact, Hole, Plain, Sweep
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import Kind
 
 T0_MS = 1_700_000_000_000
 REFUSED = "EW_NOOPT (6): the control has not got the option for this function"
@@ -31,8 +33,15 @@ CUT: dict[str, Plain] = {
 class Machine:
     """Sweeps of one control, 200 ms apart unless told otherwise, and what became of them."""
 
-    def __init__(self, signals: dict[str, SignalSection] | None = None, **options: object) -> None:
-        self.config = EdgeConfig(source=FocasConfig.model_validate(options), signals=signals or {})
+    def __init__(
+        self,
+        signals: dict[str, SignalSection] | None = None,
+        variables: dict[str, VariableSection] | None = None,
+        plc: dict[str, PlcSection] | None = None,
+        **options: object,
+    ) -> None:
+        source = FocasConfig.model_validate(options)
+        self.config = EdgeConfig(source=source, signals=signals or {}, variables=variables or {}, plc=plc or {})
         self.cursor, self.number, self.t_ms = start(self.config), 0, T0_MS
         self.pipeline, self.published = Pipeline(self.config), list[EdgeSample]()
         self.frame = SampleSet()
@@ -80,12 +89,50 @@ M6 = {"pmc.F7": 1, "pmc.F10:4": 6, "modal.M": 6, "status.mstb": 1, "block": "T7 
         ({"program.name": f"!{REFUSED}"}, "program", "O1701", None),
         ({"block": "N5 G1 X1. ;\nT9 M6"}, "nc_block", "N5 G1 X1.", None),
         ({"alarms": "SV0401 SERVO ALARM"}, "alarm", "SV0401 SERVO ALARM", None),
+        ({"alarm_list": "[]"}, "alarms", "[]", None),
+        ({"alarm_history": "[]"}, "alarm_history", "[]", None),
+        ({"operator_message": "CHECK COOLANT"}, "operator_message", "CHECK COOLANT", None),
+        ({"program.comment": "BASE PLATE"}, "program_comment", "BASE PLATE", None),
+        ({"offset.length": 127.5}, "tool_length_mm", 127.5, None),
+        ({"offset.length": "!no offset is in force: H 0"}, "tool_length_mm", None, "no offset is in force: H 0"),
+        ({"offset.length_wear": -0.01}, "tool_length_wear_mm", -0.01, None),
+        ({"offset.radius": 6.0}, "tool_radius_mm", 6.0, None),
+        ({"offset.radius_wear": 0.005}, "tool_radius_wear_mm", 0.005, None),
     ],
 )
 def test_what_each_fact_is(facts: dict[str, Plain], name: str, value: object, why: str | None) -> None:
     sample = Machine().shows(facts).last(name)
     assert (sample.value, sample.reason) == (value, why)
     assert sample.quality is (Quality.BAD if value is None else Quality.GOOD)
+
+
+@pytest.mark.parametrize(("unit", "suffix"), [("minutes", "min"), ("uses", "count")])
+def test_tool_life_is_counted_in_the_unit_of_the_configuration(unit: str, suffix: str) -> None:
+    machine = Machine(backend="library", library="x", tool_life_unit=unit).shows({"life.used": 37, "life.limit": 60})
+    assert (machine.last(f"tool_life_used_{suffix}").value, machine.last(f"tool_life_limit_{suffix}").value) == (37, 60)
+    machine.shows({"life.used": None, "life.limit": None})
+    assert machine.last(f"tool_life_used_{suffix}").reason == "unavailable: no tool group is in use"
+
+
+def test_a_byte_of_which_several_bits_are_read_is_one_observation() -> None:
+    machine = Machine(
+        tool_change_pmc="R100.0",
+        variables={"width": VariableSection(address="#500", unit="mm", scale=0.5)},
+        plc={
+            "door": PlcSection(address="R100.3", kind="flag"),
+            "pump": PlcSection(address="R100.4", kind="flag"),
+            "pressure": PlcSection(address="D300:2", unit="bar", scale=0.1),
+        },
+    ).shows({"macro.500": 80, "pmc.R100": 0b0001_1001, "pmc.D300:2": 62})
+    assert [machine.last(name).value for name in ("variable_width", "plc_door", "plc_pump")] == [40.0, True, True]
+    assert machine.last("plc_pressure").value == pytest.approx(6.2)
+    offers = {offer.signal: offer for offer in machine.frame.offers or ()}
+    assert (offers["plc_pressure"].declared.unit, offers["variable_width"].source) == ("bar", "cnc_rdmacro #500")
+    assert offers["plc_door"].declared.kind is Kind.FLAG
+    assert machine.frame.accounted()
+    machine.shows({"macro.500": None, "pmc.R100": "!no"})
+    assert machine.last("variable_width").reason == "unavailable: the variable is vacant"
+    assert machine.last("plc_door").reason == "no"
 
 
 def test_the_offers_are_the_signals_of_this_control_with_their_functions() -> None:
@@ -179,7 +226,7 @@ def test_the_strobe_alone_tells_a_change_where_the_status_is_refused() -> None:
 
 
 def test_facts_without_a_signal_are_counted() -> None:
-    machine = Machine().shows({}).shows({"tool_offset": 101.25, "modal.S": 8500, "modal.G2": "G90"})
+    machine = Machine().shows({}).shows({"tool": 12, "modal.S": 8500, "modal.G2": "G90"})
     assert machine.frame.dropped[Drop.UNMAPPED] == 3 + 3  # with motion, alarm and edit of the status
 
 
@@ -191,7 +238,7 @@ _words = (
     | st.text(max_size=20)
 )
 _keys = st.sampled_from(
-    [*IDENTITY, *CUT, "tool", "alarms", "pmc.G14", "position.X", "servo_load.B", "tool_offset", "position.é", "x"]
+    [*IDENTITY, *CUT, "tool", "alarms", "pmc.G14", "position.X", "servo_load.B", "offset.length", "position.é", "x"]
 )
 
 

@@ -173,7 +173,7 @@ def test_a_question_that_spoils_its_frame_is_asked_alone_from_then_on() -> None:
     with answering(reply) as port:
         backend = EthernetBackend(FocasConfig(port=port, timeout_s=1))
         backend.open()
-        requests = [Request(Call.SERVO_LOAD), Request(Call.OFFSET, "999")]
+        requests = [Request(Call.SERVO_LOAD), Request(Call.OFFSET, "length 999")]
         for _ in range(2):
             loads, offset = backend.ask(requests)
             assert (loads.code, offset.code) == (0, NUMBER)

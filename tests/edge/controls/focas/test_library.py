@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from edge.alarm_list import ListedAlarm, alarms_text
 from edge.config import EdgeConfig
 from edge.controls.focas import fwlib
 from edge.controls.focas.calls import Call, Opened, Request
@@ -20,8 +21,9 @@ COMPILER = shutil.which("gcc") or shutil.which("cc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler, so no stub of the library")
 SOURCE = Path(__file__).with_name("stub_fwlib.c")
 STATUS, LOAD = Request(Call.STATUS), Request(Call.SPINDLE_LOAD)
-EVERY = [Request(Call.PMC, "F10:4"), Request(Call.G_CODE, "2"), Request(Call.OFFSET, "7")]
-EVERY += [Request(call) for call in Call if call not in {Call.PMC, Call.G_CODE, Call.OFFSET}]
+EVERY = [Request(Call.PMC, "F10:4"), Request(Call.G_CODE, "2"), Request(Call.OFFSET, "length_wear 7")]
+EVERY += [Request(Call.MACRO, "500"), Request(Call.MACRO, "501"), Request(Call.COMMENT, "1701"), Request(Call.PMC, "D300:2s")]
+EVERY += [Request(call) for call in Call if call not in {one.call for one in EVERY}]
 Say = Callable[[str], None]
 
 
@@ -86,12 +88,29 @@ def test_all_structures_are_those_of_the_header(steady: Steady) -> None:
         "modal.S": 8500,
         "modal.T": 2,
         "modal.F": 3000,
+        "modal.H": 17,
+        "modal.D": 27,
         "tool": 12,
         "pmc.F10:4": 6,
         "program.name": "O9001",
         "alarms": "SV0401 SERVO ALARM",
+        "alarm_list": alarms_text([ListedAlarm("SV0401", "SERVO ALARM", active=True)]),
+        "alarm_history": alarms_text(
+            [
+                *(ListedAlarm("OT0500", "+X OVERTRAVEL", since="2026-05-13T22:04:05") for _ in range(9)),
+                ListedAlarm("SV0401", "SERVO ALARM", since="2026-05-14T09:30:15"),
+            ],
+            newest_last=True,
+        ),
+        "operator_message": "CHECK COOLANT",
+        "program.comment": "BASE PLATE",
+        "macro.500": 80.125,
+        "macro.501": None,
+        "pmc.D300:2s": -2,
+        "life.used": 37,
+        "life.limit": 60,
         "modal.G2": "G90",
-        "tool_offset": 101.25,
+        "offset.length_wear": 101.25,
     }
     assert [found[f"status.{word}"] for word in ("aut", "run", "motion", "mstb", "emergency", "alarm", "edit")] == [
         1,
