@@ -64,7 +64,6 @@ class OpcUaServer:
     folder: where its certificate is kept; secure: whether it offers security, with `open_too` beside an endpoint without
     users: passwords by name; user_certificates: of users, DER; anonymous: whether it lets those in who show neither
     missing: names of variables (last part of the path) that it does not have
-    notifier: whose events its alarms are: Sinumerik, Server, or "" for a server without events
     stepped: it looks at the control only when `look` is called, for tests that drive the machine's time
     """
 
@@ -82,7 +81,6 @@ class OpcUaServer:
         models: Collection[str] = tuple(MODELS),
         missing: Collection[str] = (),
         stepped: bool = False,
-        notifier: str = SINUMERIK_OBJECT,
         valid_days: int = 3650,
     ) -> None:
         self.control = control
@@ -95,7 +93,7 @@ class OpcUaServer:
         self._users = _Users(users or {}, user_certificates, anonymous)
         wanted = {MODELS[name] for name in models}
         self._shown = tuple(one for one in shown() if one.model in wanted and one.path[-1] not in missing)
-        self._stepped, self._notifier = stepped, notifier
+        self._stepped = stepped
         self._alarms: Alarms | None = None
         self._more_alarms: tuple[ShownAlarm, ...] = ()
         self._nodes: dict[Shown, ua.NodeId] = {}
@@ -147,7 +145,6 @@ class OpcUaServer:
 
     async def _serve(self) -> None:
         server = Server(user_manager=self._users)  # type: ignore[arg-type]  # what it needs of one
-        server.iserver.bind_condition_methods = bool(self._notifier)
         with _no_collection():
             await server.init()
         server.iserver.max_connections = CONNECTIONS_MAX
@@ -162,7 +159,7 @@ class OpcUaServer:
             await server.load_private_key(self._identity.key, format="pem")
         server.disable_clock()
         self._nodes = await build(server, self._shown, self._called)
-        self._alarms = await self._conditions(server) if self._notifier else None
+        self._alarms = await self._conditions(server)
         server.subscribe_server_callback(CallbackType.PreWrite, self._written)
         self._last.clear()
         self._server, self._loop = server, asyncio.get_running_loop()
@@ -181,10 +178,11 @@ class OpcUaServer:
             await server.stop()
 
     async def _conditions(self, server: Server) -> Alarms:
-        is_own = self._notifier == SINUMERIK_OBJECT and any(one.model == SINUMERIK for one in self._shown)
-        index = await server.get_namespace_index(SINUMERIK) if is_own else 0
-        own = server.get_node(ua.NodeId(ua.String(SINUMERIK_OBJECT), ua.Int16(index)))
-        alarms = Alarms(server, own if is_own else server.nodes.server, lambda: _stamp(self.control))
+        notifiers = [server.nodes.server]
+        if any(one.model == SINUMERIK for one in self._shown):
+            index = await server.get_namespace_index(SINUMERIK)
+            notifiers.append(server.get_node(ua.NodeId(ua.String(SINUMERIK_OBJECT), ua.Int16(index))))
+        alarms = Alarms(server, notifiers, lambda: _stamp(self.control))
         await alarms.prepare()
         return alarms
 

@@ -9,6 +9,7 @@ Documentation: docs/edge-opcua.md. Every key of the configuration: opcua.toml be
 from pathlib import Path
 
 from edge.adapter import Adapter
+from edge.controls.opcua.address import node_of_address
 from edge.controls.opcua.check import describe
 from edge.controls.opcua.config import OpcUaConfig
 from edge.controls.opcua.connection import OpcUaConnection
@@ -26,5 +27,6 @@ ADAPTER = Adapter(
     connect=OpcUaConnection,
     describe=describe,
     draft=draft,
+    address=node_of_address,
     sample_config=Path(__file__).with_name("opcua.toml"),
 )

@@ -7,7 +7,7 @@ from collections.abc import Coroutine
 from typing import Any, TypeVar
 
 from edge.adapter import Row
-from edge.controls.opcua.alarm_samples import since_text
+from edge.controls.opcua.alarm_samples import Heard, since_text
 from edge.controls.opcua.alarm_table import Alarm, listed
 from edge.controls.opcua.config import Config
 from edge.controls.opcua.cursor import parse, start
@@ -32,15 +32,19 @@ def describe(config: Config) -> list[Row]:
         sample = last.get(offer.signal)
         value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
         rows.append(Row(offer.signal, offer.source, offer.declared.unit, offer.native_unit, value, reason))
-    rows += [_alarm_row(cursor.heard.source, alarm) for alarm in listed(cursor.heard.table)]
+    rows += alarm_rows(cursor.heard)
     if config.source.security == "none":
         warning = 'opcua.security = "none": anyone in between can read and alter what the control says'
         rows.append(Row("(warning)", config.source.url, "", "", None, warning))
     return rows
 
 
+def alarm_rows(heard: Heard) -> list[Row]:
+    """Return the alarms that are there for a person to read."""
+    return [_alarm_row(heard.source, alarm) for alarm in listed(heard.table)]
+
+
 def _alarm_row(source: str, alarm: Alarm) -> Row:
-    """Return one alarm for a person to read."""
     acknowledged = {True: "acknowledged", False: "not acknowledged", None: "whether it is acknowledged is not told"}
     parts = [
         alarm.text,
@@ -63,12 +67,12 @@ async def _read(config: Config) -> tuple[Fact, ...]:
     async with session.opened(config) as client:
         try:
             values = await read_all(config, client, await resolve.resolve(config, client))
-            return (*values, *await _events(config, client))
+            return (*values, *await read_events(config, client))
         except session.FAILURES as error:
             raise ConnectionLostError(session.one_line(config, error)) from error
 
 
-async def _events(config: Config, client: Any) -> tuple[Fact, ...]:
+async def read_events(config: Config, client: Any) -> tuple[Fact, ...]:
     """Return the alarms that are there, as the events of a refresh; or why they cannot be had."""
     from edge.controls.opcua import event_session, session  # noqa: PLC0415  asyncua is an extra
 
@@ -96,8 +100,8 @@ async def _events(config: Config, client: Any) -> tuple[Fact, ...]:
 
 
 async def read_all(config: Config, client: Any, nodes: Any) -> tuple[Fact, ...]:
-    """One value of each node, those that are not there with the reason."""
-    from edge.controls.opcua import plain, session  # noqa: PLC0415  asyncua is an extra
+    """One value of each node, those that are not there with the reason; then those of the tool in the spindle."""
+    from edge.controls.opcua import plain, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
     facts = [Fact(one.key, fault=one.fault) for one in nodes if one.node is None]
     there = [one for one in nodes if one.node is not None]
@@ -108,4 +112,6 @@ async def read_all(config: Config, client: Any, nodes: Any) -> tuple[Fact, ...]:
             plain.as_fact(one.key, value, element=one.point.element, stamps=config.source.timestamps)
             for one, value in zip(some, values, strict=True)
         ]
-    return tuple(facts)
+    tools = tool_reader.ToolReader(config, client, await client.get_namespace_array(), time.monotonic)
+    tools.heard(facts)
+    return (*facts, *await tools.tick())

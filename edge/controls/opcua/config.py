@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from edge.config import EdgeConfig
+from edge.controls.opcua.address import node_of_address
 from edge.controls.opcua.point import TOOL, Point, maps, node_of
 from edge.errors import ConfigError
 from edge.section import Section
@@ -90,7 +91,10 @@ Config = EdgeConfig[OpcUaConfig]
 
 
 def points_of(config: Config) -> tuple[Point, ...]:
-    """Return what is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds."""
+    """Return what is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds.
+
+    What [variables] and [plc] choose comes last.
+    """
     ready = maps()[config.source.map].points if config.source.map else ()
     known = {point.signal: point for point in ready}
     own: dict[str, Point] = {}
@@ -101,6 +105,8 @@ def points_of(config: Config) -> tuple[Point, ...]:
                 own[name] = Point(signal=name, node=section.data_item, words=words, seen="the configuration")
             except ConfigError as error:
                 raise ConfigError(f"{config.path}: signals.{name}.data_item: {error}") from error
+    for one in config.chosen:
+        own[one.signal] = Point(signal=one.signal, node=node_of_address(one), seen="the configuration")
     kept = [point for point in ready if point.signal not in own and not (point.signal == TOOL and "tool_number" in own)]
     return tuple(point for point in (*kept, *own.values()) if is_published(config, point.signal))
 

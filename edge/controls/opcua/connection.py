@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from edge.controls.opcua.event_session import EventWatch
     from edge.controls.opcua.resolve import Resolved
     from edge.controls.opcua.session import ServerStatus, Watched
+    from edge.controls.opcua.tool_reader import ToolReader
 
 BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0
@@ -84,6 +85,7 @@ class OpcUaConnection:
         self._failures = 0
         self._delivery: Delivery | None = None
         self._events: EventWatch | None = None
+        self._tools: ToolReader | None = None
         self._outage: tuple[str, int] | None = None
         self._started_ms = 0
         self._stamps_apart_ms: int | None = None
@@ -158,7 +160,7 @@ class OpcUaConnection:
         self.reconnects += 1
         self._failures += 1
         self.last_error = str(error)
-        delivery, self._delivery, self._events = self._delivery, None, None
+        delivery, self._delivery, self._events, self._tools = self._delivery, None, None, None
         if delivery is not None and self._outage is None:
             self._outage = "session lost", delivery.heard_ms
 
@@ -182,7 +184,7 @@ class OpcUaConnection:
                     assert self._delivery is not None
                     self._hand_on(self._delivery.tick(self._now_ms(), self._clock()))
                     if self._delivery.is_open:
-                        await self._watch_events()
+                        await self._ask()
                         self._emit(Load(()), reading, status)
                     await asyncio.sleep(self._watch_s * self._chance.uniform(0.7, 1.0))  # never at one phase of its clock
             except session.FAILURES as error:
@@ -210,7 +212,7 @@ class OpcUaConnection:
         )
 
     async def _subscribe(self, client: "Client", nodes: "list[Resolved]", _status: "ServerStatus") -> None:
-        from edge.controls.opcua import event_session, session  # noqa: PLC0415  asyncua is an extra
+        from edge.controls.opcua import event_session, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
         early: list[ua.PublishResult] = []
         there = [(one.key, one.node) for one in nodes if one.node is not None]
@@ -230,6 +232,10 @@ class OpcUaConnection:
         if told is not None:
             self._events = event_session.EventWatch(client, watched.subscription, told, self._clock)
             facts += filter(None, (self._events.about, await self._events.tick()))
+        namespaces = await client.get_namespace_array()
+        self._tools = tool_reader.ToolReader(self._config, client, namespaces, self._clock)
+        self._tools.heard(await self._found(client, [one for one in nodes if one.key == tool_reader.TOOL_NUMBER]))
+        facts += await self._tools.tick()
         keep_alive_s = max(self._keep_alive_s, watched.publishing_ms / 1000)
         self._delivery = Delivery(
             items=frozenset(watched.keys.values()),
@@ -247,6 +253,14 @@ class OpcUaConnection:
         for result in early:
             heard(result)
 
+    async def _found(self, client: "Client", nodes: "list[Resolved]") -> list[Fact]:
+        """Return the present values of these nodes."""
+        from edge.controls.opcua import plain, session  # noqa: PLC0415  asyncua is an extra
+
+        there = [(one, one.node) for one in nodes if one.node is not None]
+        values = await session.read_values(client, [node for _, node in there]) if there else []
+        return [plain.as_fact(one.key, value, element=one.point.element) for (one, _), value in zip(there, values, strict=True)]
+
     def _published(self, result: "ua.PublishResult", watched: "Watched", elements: "Mapping[str, int | None]") -> None:
         from edge.controls.opcua import plain  # noqa: PLC0415  asyncua is an extra
 
@@ -257,15 +271,18 @@ class OpcUaConnection:
         stamps = self._config.source.timestamps
         facts = [plain.as_fact(key, value, element=elements[key], stamps=stamps) for key, value in known]
         facts += [] if self._events is None else self._events.facts(parts)
+        if self._tools is not None:
+            self._tools.heard(facts)
         self._compare([plain.stamps_apart_ms(value) for _, value in known])
         overflowed = tuple(key for key, value in known if plain.overflowed(value))
         self._heard(Notification(int(result.NotificationMessage.SequenceNumber), tuple(facts), overflowed, not parts))
 
-    async def _watch_events(self) -> None:
-        """Have the alarms repeated where that is due."""
+    async def _ask(self) -> None:
+        """Have the alarms repeated, and read what belongs to the tool in the spindle, where that is due."""
         fault = None if self._events is None else await self._events.tick()
-        if fault is not None:
-            self._emit(Load((fault,)))
+        of_tool = [] if self._tools is None else await self._tools.tick()
+        if fault is not None or of_tool:
+            self._emit(Load((*([] if fault is None else [fault]), *of_tool)))
 
     def _compare(self, apart_ms: list[int | None]) -> None:
         """Note how close the samples' stamps ever come to the server's clock; an old value may be far from it."""

@@ -16,6 +16,7 @@ from edge.controls.opcua.config import Config, is_published, points_of
 from edge.controls.opcua.point import TOOL, Point
 from edge.controls.opcua.spindle_tool import Tools, in_spindle
 from edge.controls.opcua.spindle_tool import told as tool_told
+from edge.controls.opcua.tool_life import Limits, counted_up, noted
 from edge.errors import ConfigError
 from edge.place import Place
 from edge.reading import Target, bad, read_value
@@ -38,6 +39,14 @@ class Meaning:
     prefix: str = ""
     source: str = ""
     native_unit: str = ""
+    unit: str = ""
+    counts_down_from: str = ""
+
+    @property
+    def offer(self) -> Offer:
+        """Return what the birth certificate says of it."""
+        one = self.target
+        return Offer(one.signal, self.source, self.native_unit, one.low, one.high, self.unit, one.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +54,7 @@ class Cursor:
     """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
 
     heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
+    limits: the last values of signals from which others count down
     """
 
     position: SweepPosition = field(default_factory=SweepPosition)
@@ -54,6 +64,7 @@ class Cursor:
     tool: str = "?"
     heard: Heard = field(default_factory=Heard)
     alarm_variable: Fact | None = None
+    limits: Limits = ()
 
 
 class _Both(NamedTuple):
@@ -171,11 +182,16 @@ def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | Non
         return None
     if section is not None and not section.publish:
         return None
+    chosen = next((one for one in config.chosen if one.signal == key), None)
+    if chosen is not None:
+        return Meaning(chosen.target(key), source=point.label, unit=chosen.unit)
     low = section.low if section and section.low is not None else known.low
     high = section.high if section and section.high is not None else known.high
     scale = point.scale * (section.scale if section else 1.0)
-    target = Target(key, key, way.factor * scale, way.offset, low, high)
-    return Meaning(target, tuple(point.words.items()), point.prefix, point.label, native)
+    is_left = bool(point.counts_down_from)  # what is left of a life may be below zero
+    target = Target(key, key, way.factor * scale, way.offset, None if is_left else low, None if is_left else high)
+    words = tuple(point.words.items())
+    return Meaning(target, words, point.prefix, point.label, native, counts_down_from=point.counts_down_from)
 
 
 def _stands_for(template: str, key: str) -> bool:
@@ -183,9 +199,7 @@ def _stands_for(template: str, key: str) -> bool:
 
 
 def _offers(config: Config, cursor: Cursor) -> tuple[Offer, ...]:
-    offers = {
-        m.target.signal: Offer(m.target.signal, m.source, m.native_unit, m.target.low, m.target.high) for m in cursor.meanings
-    }
+    offers = {meaning.target.signal: meaning.offer for meaning in cursor.meanings}
     if cursor.tools:
         offers["tool_number"] = Offer("tool_number", "ToolType/Location")
     for offer in cursor.heard.offers():
@@ -200,6 +214,7 @@ def _samples(
 ) -> tuple[Cursor, tuple[EdgeSample, ...], dict[str, int]]:
     """The facts in the order of their time stamps. What is found on joining is one state: its tools are looked at once."""
     meanings = {meaning.target.data_item_id: meaning for meaning in cursor.meanings}
+    limiting = {meaning.counts_down_from for meaning in cursor.meanings}
     dropped: Counter[str] = Counter()
     samples: list[EdgeSample] = []
     ordered = sorted(sweep.facts, key=lambda fact: sweep.t_ms if fact.t_ms is None else fact.t_ms)
@@ -213,7 +228,9 @@ def _samples(
         for fact in moment:
             meaning = meanings.get(fact.key)
             if meaning is not None:
-                samples.append(_sample(meaning, fact, sweep))
+                sample = counted_up(_sample(meaning, fact, sweep), meaning.counts_down_from, cursor.limits)
+                cursor = replace(cursor, limits=noted(cursor.limits, sample)) if sample.signal in limiting else cursor
+                samples.append(sample)
             elif not _is_tool(fact.key):
                 dropped[Drop.UNMAPPED] += 1
     marked = tuple(replace(sample, is_baseline=is_baseline) for sample in samples)

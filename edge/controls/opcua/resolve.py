@@ -51,7 +51,7 @@ class BrowsedNode(NamedTuple):
 
 async def resolve(config: Config, client: Client) -> list[Resolved]:
     """Every point of the configuration on this server; those that the server does not have are there with the reason."""
-    points = points_of(config)
+    points = [point for point in points_of(config) if not point.follows_tool]
     namespaces = await client.get_namespace_array()
     resolved = [_by_name(point, namespaces) for point in points if point.node]
     browsed = [point for point in points if not point.node]

@@ -94,6 +94,22 @@ def test_the_check_shows_severity_and_acknowledge_state_of_each_alarm(bench: Ben
     }
 
 
+def test_a_control_without_a_node_of_its_own_tells_its_alarms_at_the_server_object(bench: Bench) -> None:
+    bench.server.set_alarms(LOW)
+    (row,) = (row for row in describe(bench.config(map="cnc_40502")) if row.signal == "(alarm) 700012")
+    assert row.source == "i=2253"
+
+
+def test_a_branch_stays_on_the_list_beside_its_condition_until_it_is_acknowledged(bench: Bench) -> None:
+    earlier = ShownAlarm("700012", "Coolant level low", 500, acknowledged=False, branch=1)
+    bench.server.set_alarms(LOW, earlier)
+    with reading(bench.config()) as reader:
+        first = until_alarms(reader, ("700012", False), ("700012", False))
+        assert [alarm["active"] for alarm in alarms(first) or []] == [True, False]
+        bench.server.set_alarms(LOW)
+        until_alarms(reader, ("700012", False))
+
+
 def test_where_a_node_gives_no_events_that_is_said_and_no_error(bench: Bench) -> None:
     wrong = bench.config(events="nsu=SinumerikVarProvider;s=/Channel/State/actTNumber[u1,1]")
     with reading(wrong) as reader:

@@ -64,7 +64,7 @@ def test_first_the_state_as_found_then_each_change_with_the_controls_own_time(be
         first = reader.until(lambda one: bool(one.samples))
         assert {s.signal: s.value for s in first.samples}["tool_number"] == 3
         assert all(s.is_baseline for s in first.samples)
-        assert len(first.offers or ()) == 18
+        assert len(first.offers or ()) == 26
         bench.show(ControlState(tool_number=3, exec_state="ACTIVE", program="O1", line=6, block="T4 M6"))
         bench.show(ControlState(tool_number=0, exec_state="ACTIVE", program="O1", line=6, block="T4 M6"))
         bench.show(ControlState(tool_number=4, exec_state="ACTIVE", program="O1", line=7))
