@@ -55,7 +55,7 @@ def told(heard: Heard, facts: Iterable[Fact], frame_ms: int, number: int) -> Tol
     at_ms = 0
     for fact in facts:
         own_ms = frame_ms if fact.t_ms is None else fact.t_ms
-        at_ms = max(at_ms, own_ms)
+        at_ms = max(at_ms, own_ms) if fact.key == EVENT else at_ms
         after, news, drop = _one(heard, fact, own_ms, at_ms)
         if drop is not None:
             dropped[drop] += 1
@@ -72,7 +72,7 @@ def _one(heard: Heard, fact: Fact, own_ms: int, at_ms: int) -> tuple[Heard, tupl
         is_refused = fact.key == EVENTS
         phase, kept = (Phase.NONE, ()) if is_refused else (Phase.PARTIAL, table.alarms)
         after = Heard("" if is_refused else heard.source, AlarmTable(phase, kept, why_not=fact.fault or "no reason given"))
-        return after, _samples(after, at_ms, is_baseline=True), None
+        return after, _samples(after, own_ms, is_baseline=True), None
     event = Event.read(fact)
     if event is None:
         return heard, (), Drop.UNPARSABLE
