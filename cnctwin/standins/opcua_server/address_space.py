@@ -27,6 +27,7 @@ async def build(server: Server, shown: Iterable[Shown], calls: Any) -> dict[Show
                 objects[place] = await _object(server, parent, index, step, types)
             parent = objects[place]
         nodes[one] = await _variable(parent, index, one)
+        objects[one.model, *one.path] = server.get_node(nodes[one])  # a variable may have properties of its own
     if indices:
         index = min(indices.values())
         await server.nodes.objects.add_method(ua.NodeId(ua.String("/Methods/Reset"), ua.Int16(index)), "Reset", calls, [], [])

@@ -128,6 +128,28 @@ def _cnc() -> tuple[Shown, ...]:
     )
 
 
+def _tool_life(tool_path: tuple[str, ...], tool: int) -> tuple[Shown, ...]:
+    """The life of one tool: of odd ones in hours that are left, of even ones in parts that were made."""
+
+    def one(name: str, kind: str, value: Callable[[ControlState], Value], unit: str = "") -> Shown:
+        return Shown(MACHINE_TOOL, (*tool_path, "ToolLife", *name.split("/")), kind, value, unit=unit)
+
+    if tool % 2:
+        return (
+            one("Time", "Double", lambda s: 1.0 - s.part_count / 100 % 1.0, "h"),
+            one("Time/Indication", "Int32", lambda s: 0),
+            one("Time/IsCountingUp", "Boolean", lambda s: False),
+            one("Time/StartValue", "Double", lambda s: 1.0),
+            one("Time/LimitValue", "Double", lambda s: 0.0),
+        )
+    return (
+        one("Parts", "UInt32", lambda s: s.part_count % 200),
+        one("Parts/Indication", "Int32", lambda s: 1),
+        one("Parts/IsCountingUp", "Boolean", lambda s: True),
+        one("Parts/LimitValue", "UInt32", lambda s: 200),
+    )
+
+
 def _machine_tool() -> tuple[Shown, ...]:
     root = ("Machines:", "Mill:MachineToolType")
     channel = (*root, "Monitoring:MonitoringType", "Channel1:ChannelMonitoringType")
@@ -145,6 +167,7 @@ def _machine_tool() -> tuple[Shown, ...]:
             one(where, "ControlIdentifier1", "UInt32", lambda s, t=tool: t),  # type: ignore[misc]
             one(where, "Location/Name", "String", lambda s, t=tool: "Spindle" if s.tool_number == t else "Magazine"),  # type: ignore[misc]
             one(where, "Location/PlaceNumber", "UInt16", lambda s, t=tool: 99 if s.tool_number == t else t),  # type: ignore[misc]
+            *_tool_life(where, tool),
         )
     )
     return (

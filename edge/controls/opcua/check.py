@@ -12,6 +12,7 @@ from edge.controls.opcua.alarm_table import Alarm, listed
 from edge.controls.opcua.config import Config
 from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.library import require
+from edge.controls.opcua.spindle_tool import index_in_spindle
 from edge.errors import ConnectionLostError
 from edge.sweep import Fact, Sweep
 
@@ -101,7 +102,7 @@ async def read_events(config: Config, client: Any) -> tuple[Fact, ...]:
 
 async def read_all(config: Config, client: Any, nodes: Any) -> tuple[Fact, ...]:
     """One value of each node, those that are not there with the reason; then those of the tool in the spindle."""
-    from edge.controls.opcua import plain, session, tool_reader  # noqa: PLC0415  asyncua is an extra
+    from edge.controls.opcua import life_reader, plain, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
     facts = [Fact(one.key, fault=one.fault) for one in nodes if one.node is None]
     there = [one for one in nodes if one.node is not None]
@@ -112,6 +113,10 @@ async def read_all(config: Config, client: Any, nodes: Any) -> tuple[Fact, ...]:
             plain.as_fact(one.key, value, element=one.point.element, stamps=config.source.timestamps)
             for one, value in zip(some, values, strict=True)
         ]
-    tools = tool_reader.ToolReader(config, client, await client.get_namespace_array(), time.monotonic)
+    namespaces = await client.get_namespace_array()
+    tools = tool_reader.ToolReader(config, client, namespaces, time.monotonic)
     tools.heard(facts)
-    return (*facts, *await tools.tick())
+    cursor, _ = parse(config, start(config), Sweep("check", 0, 1, tuple(facts)).encode())
+    life = life_reader.LifeReader(client, nodes, namespaces, time.monotonic)
+    of_life = await life.tick(index_in_spindle(cursor.tools, config.source.spindle_place))
+    return (*facts, *await tools.tick(), *of_life)

@@ -21,6 +21,7 @@ from edge.controls.opcua.config import Config, points_of
 from edge.controls.opcua.cursor import Cursor
 from edge.controls.opcua.delivery import Delivery, Load, Notification
 from edge.controls.opcua.library import require
+from edge.controls.opcua.spindle_tool import index_in_spindle
 from edge.errors import ConnectionLostError, EdgeError
 from edge.sample import ClockReading
 from edge.sweep import Fact, Hole, Sweep
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from asyncua.client.client import Client
 
     from edge.controls.opcua.event_session import EventWatch
+    from edge.controls.opcua.life_reader import LifeReader
     from edge.controls.opcua.resolve import Resolved
     from edge.controls.opcua.session import ServerStatus, Watched
     from edge.controls.opcua.tool_reader import ToolReader
@@ -86,6 +88,8 @@ class OpcUaConnection:
         self._delivery: Delivery | None = None
         self._events: EventWatch | None = None
         self._tools: ToolReader | None = None
+        self._life_reader: LifeReader | None = None
+        self._tool_index: int | None = None
         self._outage: tuple[str, int] | None = None
         self._started_ms = 0
         self._stamps_apart_ms: int | None = None
@@ -94,7 +98,8 @@ class OpcUaConnection:
         self.last_error = _unsafe(config)
 
     def follow(self, cursor: Cursor) -> None:
-        """Hear where the parser stands; a subscription does not depend on it."""
+        """Hear where the parser stands: which of the tools is in the spindle, where it is found from their places."""
+        self._tool_index = index_in_spindle(cursor.tools, self._config.source.spindle_place)
 
     def silent_s(self) -> float:
         """Seconds since the server was heard."""
@@ -160,7 +165,8 @@ class OpcUaConnection:
         self.reconnects += 1
         self._failures += 1
         self.last_error = str(error)
-        delivery, self._delivery, self._events, self._tools = self._delivery, None, None, None
+        delivery, self._delivery, self._events = self._delivery, None, None
+        self._tools = self._life_reader = None
         if delivery is not None and self._outage is None:
             self._outage = "session lost", delivery.heard_ms
 
@@ -212,7 +218,7 @@ class OpcUaConnection:
         )
 
     async def _subscribe(self, client: "Client", nodes: "list[Resolved]", _status: "ServerStatus") -> None:
-        from edge.controls.opcua import event_session, session, tool_reader  # noqa: PLC0415  asyncua is an extra
+        from edge.controls.opcua import event_session, life_reader, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
         early: list[ua.PublishResult] = []
         there = [(one.key, one.node) for one in nodes if one.node is not None]
@@ -234,6 +240,7 @@ class OpcUaConnection:
             facts += filter(None, (self._events.about, await self._events.tick()))
         namespaces = await client.get_namespace_array()
         self._tools = tool_reader.ToolReader(self._config, client, namespaces, self._clock)
+        self._life_reader = life_reader.LifeReader(client, nodes, namespaces, self._clock)
         self._tools.heard(await self._found(client, [one for one in nodes if one.key == tool_reader.TOOL_NUMBER]))
         facts += await self._tools.tick()
         keep_alive_s = max(self._keep_alive_s, watched.publishing_ms / 1000)
@@ -281,6 +288,7 @@ class OpcUaConnection:
         """Have the alarms repeated, and read what belongs to the tool in the spindle, where that is due."""
         fault = None if self._events is None else await self._events.tick()
         of_tool = [] if self._tools is None else await self._tools.tick()
+        of_tool += [] if self._life_reader is None else await self._life_reader.tick(self._tool_index)
         if fault is not None or of_tool:
             self._emit(Load((*([] if fault is None else [fault]), *of_tool)))
 

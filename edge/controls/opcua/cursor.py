@@ -16,7 +16,7 @@ from edge.controls.opcua.config import Config, is_published, points_of
 from edge.controls.opcua.point import TOOL, Point
 from edge.controls.opcua.spindle_tool import Tools, in_spindle
 from edge.controls.opcua.spindle_tool import told as tool_told
-from edge.controls.opcua.tool_life import Limits, counted_up, noted
+from edge.controls.opcua.tool_life import TOOL_LIFE, Limits, counted_up, life_samples, noted
 from edge.errors import ConfigError
 from edge.place import Place
 from edge.reading import Target, bad, read_value
@@ -54,7 +54,7 @@ class Cursor:
     """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
 
     heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
-    limits: the last values of signals from which others count down
+    limits: the last values of signals from which others count down; life: signals of a tool's life that were published
     """
 
     position: SweepPosition = field(default_factory=SweepPosition)
@@ -65,6 +65,7 @@ class Cursor:
     heard: Heard = field(default_factory=Heard)
     alarm_variable: Fact | None = None
     limits: Limits = ()
+    life: tuple[str, ...] = ()
 
 
 class _Both(NamedTuple):
@@ -115,7 +116,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 def _offered(cursor: Cursor) -> tuple[object, ...]:
     """Return what the offers depend on."""
-    return cursor.meanings, bool(cursor.tools), cursor.heard.offers(), cursor.heard.is_authority
+    return cursor.meanings, cursor.life, bool(cursor.tools), cursor.heard.offers(), cursor.heard.is_authority
 
 
 def _published(config: Config, events: tuple[EdgeSample, ...], dropped: Counter[str]) -> tuple[EdgeSample, ...]:
@@ -156,7 +157,9 @@ def _alarm_variable(config: Config, cursor: Cursor) -> Meaning | None:
 def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
     """Return what keys mean that have not come before in this life."""
     known = {meaning.target.data_item_id for meaning in cursor.meanings} | set(cursor.unmapped)
-    fresh = [key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key)]
+    fresh = [
+        key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key) and key != TOOL_LIFE
+    ]
     if not fresh or len(known) + len(fresh) > MEANINGS_MAX:
         return cursor
     points, found = points_of(config), list[Meaning]()
@@ -202,6 +205,7 @@ def _offers(config: Config, cursor: Cursor) -> tuple[Offer, ...]:
     offers = {meaning.target.signal: meaning.offer for meaning in cursor.meanings}
     if cursor.tools:
         offers["tool_number"] = Offer("tool_number", "ToolType/Location")
+    offers |= {name: Offer(name, "ToolType/ToolLife") for name in cursor.life}
     for offer in cursor.heard.offers():
         is_ours = offer.signal not in offers or (offer.signal == ALARM and _alarm_variable(config, cursor) is None)
         if is_ours and is_published(config, offer.signal):
@@ -226,6 +230,13 @@ def _samples(
             dropped[Drop.UNCHANGED] += len(placed) - (0 if sample is None else 1)
             samples += [] if sample is None else [sample]
         for fact in moment:
+            if fact.key == TOOL_LIFE:
+                found = life_samples(fact, cursor.life, sweep.t_ms if fact.t_ms is None else fact.t_ms)
+                found = tuple(sample for sample in found if is_published(config, sample.signal))
+                cursor = replace(cursor, life=tuple(sorted({*cursor.life, *(sample.signal for sample in found)})))
+                dropped[Drop.UNMAPPED] += 1 - observations_of(found)
+                samples += found
+                continue
             meaning = meanings.get(fact.key)
             if meaning is not None:
                 sample = counted_up(_sample(meaning, fact, sweep), meaning.counts_down_from, cursor.limits)

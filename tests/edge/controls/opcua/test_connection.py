@@ -36,6 +36,7 @@ class Reader:
         try:
             for raw in self._frames:
                 self._cursor, one = parse(self._config, self._cursor, raw)
+                self.connection.follow(self._cursor)
                 assert one.accounted()
                 self.seen.append(one)
                 if told(one):

@@ -64,7 +64,7 @@ def test_a_drafted_configuration_loads_and_shows_the_control_in_true_units(bench
     bench.show(ControlState(tool_number=4, feed_mm_min=1500.0))
     text = draft(address(bench), 'M"1')
     assert "# It is a SINUMERIK 828D, 840D sl, ONE: 25 of 25 signals, mapped below" in text
-    assert "# It follows OPC 40501-1, machine tools: 7 of 7 signals" in text
+    assert "# It follows OPC 40501-1, machine tools: 9 of 9 signals" in text
     config = parse(text.replace("[opcua]", f'[opcua]\ncertificate_folder = "{bench.folder}/edge"'), tmp_path / "mill.toml")
     assert config.machine.name == 'M"1'
     assert config.source.map == "sinumerik", "what a control calls its own is more than a model that it follows besides"

@@ -1,6 +1,10 @@
 """What a control keeps of the tool in the spindle, and what is read by its address."""
 
+import json
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 pytest.importorskip("asyncua")
 
@@ -12,6 +16,7 @@ from edge.controls.opcua.address import node_of_address
 from edge.controls.opcua.check import describe
 from edge.controls.opcua.config import OpcUaConfig
 from edge.controls.opcua.cursor import parse, start
+from edge.controls.opcua.tool_life import LifeEntry, life_fact
 from edge.errors import ConfigError
 from edge.sweep import Fact, Sweep
 from tests.edge.controls.opcua.conftest import Bench
@@ -110,3 +115,53 @@ def test_what_is_left_of_a_life_is_told_as_what_was_used(limit: float | None, le
     assert one.accounted()
     (sample,) = (s for s in one.samples if s.signal == "tool_life_used_min")
     assert (sample.reason if sample.value is None else sample.value) == used
+
+
+def test_a_tools_life_is_found_where_a_machine_follows_40501_in_hours_that_are_left_or_parts_that_were_made(bench: Bench) -> None:
+    bench.show(ControlState(tool_number=3, part_count=25))
+    with reading(bench.config(map="machinetool_40501")) as reader:
+        reader.until_value("tool_life_used_min", 15.0)
+        bench.show(ControlState(tool_number=2, part_count=25))
+        other = reader.until(lambda one: any(s.signal == "tool_life_used_count" for s in one.samples))
+        found = {s.signal: s.reason if s.value is None else s.value for s in other.samples if s.signal.startswith("tool_life")}
+        assert found == {
+            "tool_life_limit_count": 200,
+            "tool_life_used_count": 25,
+            "tool_life_limit_min": "the control keeps no such life of this tool",
+            "tool_life_used_min": "the control keeps no such life of this tool",
+        }
+    rows = {row.signal: row.value for row in describe(bench.config(map="machinetool_40501"))}
+    assert (rows["tool_life_limit_count"], rows["tool_life_used_count"]) == (200, 25)
+
+
+@pytest.mark.parametrize(
+    ("entry", "limit", "used"),
+    [
+        (LifeEntry(0, False, 0.75, 1.0, 0.0, "h"), 60.0, 15.0),
+        (LifeEntry(0, False, 0.75, 1.0, None, ""), 60.0, 15.0),
+        (LifeEntry(0, True, 30.0, 0.0, 90.0, "min"), 90.0, 30.0),
+        (LifeEntry(0, True, 30.0, None, None, "min"), "the control tells no limit", 30.0),
+        (LifeEntry(1, True, 12.0, None, 200.0), 200, 12),
+        (LifeEntry(2, False, 12.0, 200.0, 0.0), 200, 188),
+        (LifeEntry(2, True, 12.5, None, 200.0), 200, "not a whole number: 12.5"),
+        (LifeEntry(1, False, 12.0, None, 0.0), *["the control tells what is left, and not where it began"] * 2),
+        (LifeEntry(3, True, 12.0, None, 200.0, "mm"), None, None),  # a distance, for which there is no signal
+    ],
+)
+def test_a_life_of_40501_counts_up_or_down_in_its_unit(entry: LifeEntry, limit: object, used: object) -> None:
+    kind = "min" if entry.indication == 0 else "count"
+    config = EdgeConfig(source=OpcUaConfig(map="machinetool_40501"))
+    _, one = parse(config, start(config), Sweep("a", 0, 1_000, (life_fact([entry]),)).encode())
+    assert one.accounted()
+    found = {s.signal: s.reason if s.value is None else s.value for s in one.samples}
+    assert found == ({} if used is None else {f"tool_life_limit_{kind}": limit, f"tool_life_used_{kind}": used})
+
+
+@given(
+    st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=3), lambda c: st.lists(c, max_size=6), max_leaves=9)
+)
+def test_a_life_that_is_none_gives_nothing(junk: object) -> None:
+    config = EdgeConfig(source=OpcUaConfig(map="machinetool_40501"))
+    _, one = parse(config, start(config), Sweep("a", 0, 1_000, (Fact("tool_life", json.dumps(junk)),)).encode())
+    assert one.accounted()
+    assert one.error is None
