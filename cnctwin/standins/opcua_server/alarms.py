@@ -19,6 +19,7 @@ from asyncua.server.server import Server
 from asyncua.ua.object_ids import ObjectIds
 
 from cnctwin.standins.opcua_server.shown import CNC
+from cnctwin.standins.simulated_control.state import ControlState
 
 SEVERITY = 1000  # that of an alarm which stops the machine; a warning has 500, information 1
 
@@ -42,6 +43,11 @@ class ShownAlarm:
     def identity(self) -> tuple[str, int, int]:
         """Return what stays the same while the alarm changes."""
         return self.code, self.number, self.branch
+
+
+def alarms_of(state: ControlState) -> tuple[ShownAlarm, ...]:
+    """Return what a PLC would say of this moment of the simulated day: between two parts the door is open."""
+    return () if state.exec_state == "ACTIVE" else (ShownAlarm("700016", "Safety door open", 500, acknowledged=False),)
 
 
 class Alarms:
