@@ -77,8 +77,8 @@ def _one(heard: Heard, fact: Fact, own_ms: int, at_ms: int) -> tuple[Heard, tupl
     if event is None:
         return heard, (), Drop.UNPARSABLE
     if event.kind is Kind.MESSAGE:
-        message = EdgeSample("operator_message", event.text, at_ms)
-        return (heard, (message,), None) if event.text else (heard, (), Drop.UNMAPPED)
+        message = EdgeSample("operator_message", " ".join(filter(None, (event.code, event.text))), at_ms)
+        return (heard, (message,), None) if message.value else (heard, (), Drop.UNMAPPED)
     if event.kind is not Kind.CONDITION and event.kind not in _REFRESH:
         return heard, (), Drop.UNMAPPED
     after = replace(heard, table=fold(table, event, own_ms))

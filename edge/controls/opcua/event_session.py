@@ -28,6 +28,7 @@ TYPES_MAX = 2_000
 DEPTH_MAX = 12
 REFRESH_S_MAX, REFRESH_APART_S_MIN = 10.0, 10.0
 AT_ONCE = 100
+NO_FIELDS = "not asked for, since the server refuses the fields of conditions"
 _BASE, _CONDITION = ObjectIds.BaseEventType, ObjectIds.ConditionType
 _SERVER = "i=2253"
 _OF_FILTER = {
@@ -40,13 +41,17 @@ _OF_FILTER = {
 
 
 class Listening(NamedTuple):
-    """A subscription to events: its source as a configuration names it, or why there is none; its fields and types."""
+    """A subscription to events: its source as a configuration names it, or why there is none; its fields and types.
+
+    is_simple: the server gives those fields alone that every event has, so that nothing is known of conditions
+    """
 
     source: str
     fault: str
     fields: Fields
     types: Mapping[str, EventType]
     stamps: str
+    is_simple: bool = False
 
     def told(self, values: Sequence[ua.Variant]) -> Fact:
         """Return one event as a fact."""
@@ -87,7 +92,8 @@ class EventWatch:
         now_s = self._clock()
         if self._is_due and now_s - self._asked_s >= REFRESH_APART_S_MIN:
             self._is_due, self._is_waiting, self._asked_s = False, True, now_s
-            fault = await refresh(self._client, self._subscription)
+            is_simple = self._listening.is_simple
+            fault = refresh_fault(NO_FIELDS) if is_simple else await refresh(self._client, self._subscription)
             self._is_waiting &= fault is None
             return fault
         if self._is_waiting and now_s - self._asked_s > REFRESH_S_MAX:
@@ -111,7 +117,7 @@ async def listen(config: Config, client: Client, subscription: int) -> Listening
             fields = fields_for(types, namespaces, simple=simple)
             status = await _monitor(client, subscription, node, fields)
             if status.is_good():
-                return Listening(name_of(node, namespaces), "", fields, types, config.source.timestamps)
+                return Listening(name_of(node, namespaces), "", fields, types, config.source.timestamps, simple)
             if status_name(status) not in _OF_FILTER:
                 break
         faults.append(f"{source}: {status_name(status)}")

@@ -10,6 +10,7 @@ pytest.importorskip("asyncua")
 
 from cnctwin.standins.opcua_server.alarms import ShownAlarm
 from cnctwin.standins.simulated_control.state import ControlState
+from edge.controls.opcua import event_session
 from edge.controls.opcua.check import describe
 from edge.controls.opcua.library import CONDITION_REFRESH, CONDITION_TYPE, ForbiddenServiceError, ReadOnlyGuard
 from edge.sample import SampleSet
@@ -121,6 +122,27 @@ def test_where_a_node_gives_no_events_that_is_said_and_no_error(bench: Bench) ->
     with reading(bench.config(events="none")) as reader:
         first = reader.until(lambda one: bool(one.samples))
         assert "alarms" not in {offer.signal for offer in first.offers or ()}
+
+
+def test_a_server_that_refuses_the_fields_of_conditions_still_tells_messages(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from asyncua import ua
+    from asyncua.ua.status_codes import StatusCodes
+
+    real = event_session._monitor
+
+    async def monitor(config: Any, client: Any, node: Any, fields: Any) -> Any:
+        refused = ua.StatusCode(ua.UInt32(StatusCodes.BadEventFilterInvalid))
+        return refused if "Retain" in fields.names else await real(config, client, node, fields)
+
+    monkeypatch.setattr(event_session, "_monitor", monitor)
+    with reading(bench.config()) as reader:
+        first = reader.until(lambda one: any(s.signal == "alarms" for s in one.samples))
+        (reason,) = (str(s.reason) for s in first.samples if s.signal == "alarms")
+        assert "refuses the fields of conditions" in reason
+        bench.server.say("Load pallet 2")
+        reader.until_value("operator_message", "Load pallet 2")
 
 
 @pytest.mark.parametrize(
