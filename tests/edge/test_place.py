@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from edge.controls.mtconnect.cursor import Phase, next_request, place, resume, start
+from edge.controls.mtconnect.cursor import next_request, place, resume, start
+from edge.controls.mtconnect.state import Phase
 from edge.place import EDGE_RESTARTED, Place, PlaceFile
 from edge.sample import Drop
 from tests.edge.controls.mtconnect.agent_documents import CONFIG, fed, probe, streams, value, values

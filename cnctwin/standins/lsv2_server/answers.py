@@ -28,6 +28,9 @@ class Model(StrEnum):
     TNC640 = "TNC640"
 
 
+TOOL_TABLES = {Model.ITNC530: "TNC:\\TOOL.T", Model.TNC640: "TNC:\\table\\tool.t"}
+
+
 class Code(IntEnum):
     """Codes of T_ER."""
 
@@ -73,9 +76,10 @@ _VERSIONS = {
     Model.ITNC530: ("iTNC530", "340490 06 SP3", "800A_AA.PLC", "%0000111100000000"),
     Model.TNC640: ("TNC640", "340590 08 SP7", "17-M008-V01SP11", "%0000000011000010"),
 }
-_LOGINS = frozenset({"INSPECT", "DIAGNOSTICS", "PLCDEBUG", "FILE", "MONITOR", "DNC"})
+_LOGINS = frozenset({"INSPECT", "DIAGNOSTICS", "PLCDEBUG", "FILE", "MONITOR", "DNC", "DATA"})
 _NEEDED = {"R_VR": "INSPECT", "R_PR": "INSPECT", "R_CI": "INSPECT", "R_RI": "DNC", "R_MB": "PLCDEBUG"}
 _NEEDED |= {"R_OC": "OSZI", "R_OP": "OSZI", "R_OD": "OSZI"}
+_NEEDED |= {"R_DP": "DATA"}
 _NEEDED |= {"R_FI": "FILE", "R_FL": "FILE", "R_DT": "DIAGNOSTICS"}
 _PROGRAM_STATES = {"ACTIVE": 0, "FEED_HOLD": 1, "OPTIONAL_STOP": 1, "PROGRAM_STOPPED": 1, "WAIT": 1, "PROGRAM_COMPLETED": 2}
 _PROGRAM_STATES |= {"STOPPED": 3, "INTERRUPTED": 4, "READY": 7}
@@ -108,6 +112,7 @@ class Answers:
         self.packets_lost: frozenset[int] = frozenset()
         self.control, self.model, self.has_dnc, self.plc_password = control, model, has_dnc, plc_password
         self.counters = Counters()
+        self.tool_table = files(__package__).joinpath("tool.t").read_text(encoding="ascii")
         self.program_text = files(__package__).joinpath("base_plate.h").read_text(encoding="ascii")
         self.saved_s = 1_767_225_600  # when the program was saved last, seconds since 1970
         self._tells: dict[str, Callable[[Session, bytes], bytes]] = {
@@ -119,6 +124,7 @@ class Answers:
             "R_CI": self._system,
             "R_RI": self._run_info,
             "R_MB": self._memory,
+            "R_DP": self._data_path,
             "R_FI": self._file_info,
             "R_FL": self._file,
             "R_DT": lambda _session, _payload: encode("S_DT", struct.pack("!L", int(control.calendar_s()))),
@@ -219,20 +225,42 @@ class Answers:
         found = plc_memory.read(self.control.now(), *struct.unpack("!LB", payload))
         return error(Code.BAD_MEMORY_ADDRESS) if found is None else encode("S_MB", found)
 
-    def _is_program(self, path: bytes) -> bool:
-        return path.decode("latin-1").upper() == f"{PROGRAM_FOLDER}{self.control.now().program}.H".upper()
+    def _data_path(self, _session: Session, payload: bytes) -> bytes:
+        """One value of the tool table, as a double (5): four zero bytes and the path come, type and value go."""
+        if self.model is not Model.ITNC530:
+            return error(Code.UNKNOWN_TELEGRAM)
+        parts = payload[4:].rstrip(b"\x00").decode("latin-1").upper().split("\\")
+        lines = self.tool_table.splitlines()
+        if len(parts) != 6 or parts[1:4] != ["TABLE", "TOOL", "T"] or parts[5] not in ("L", "R"):
+            return error(Code.WRONG_PARAMETER)
+        row = next((line for line in lines[2:] if line.split()[0] == parts[4]), None)
+        at = lines[1].index(f" {parts[5]} ")
+        return (
+            error(Code.WRONG_PARAMETER)
+            if row is None
+            else encode("S_DP", struct.pack("!L", 5) + struct.pack("<d", float(row[at : at + 12])))
+        )
+
+    def _file_at(self, path: bytes) -> str | None:
+        """The text of a file: the program that is selected, and the table of the tools."""
+        name = path.decode("latin-1").upper()
+        if name == f"{PROGRAM_FOLDER}{self.control.now().program}.H".upper():
+            return self.program_text
+        return self.tool_table if name == TOOL_TABLES[self.model].upper() else None
 
     def _file_info(self, _session: Session, payload: bytes) -> bytes:
         path = payload.rstrip(b"\x00")
-        if not self._is_program(path):
+        content = self._file_at(path)
+        if content is None:
             return error(Code.NO_FILE)
-        return encode("S_FI", struct.pack("!3L", len(self.program_text), self.saved_s, 0x02) + path + b"\x00")
+        return encode("S_FI", struct.pack("!3L", len(content), self.saved_s, 0x02) + path + b"\x00")
 
     def _file(self, session: Session, payload: bytes) -> bytes:
         path, _, mode = payload.partition(b"\x00")
-        if not self._is_program(path):
+        found = self._file_at(path)
+        if found is None:
             return error(Code.NO_FILE)
-        text = self.program_text.encode("utf-8")
+        text = found.encode("utf-8")
         content = text if mode == b"\x01" else text.replace(b"\n", b"\x00")
         size = session.block_bytes - HEADER_BYTES - 2
         session.unread = [content[at : at + size] for at in range(0, len(content), size)]

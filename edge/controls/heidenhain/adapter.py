@@ -10,6 +10,7 @@ Documentation: docs/edge-heidenhain.md. Every key of the configuration: heidenha
 from pathlib import Path
 
 from edge.adapter import Adapter
+from edge.controls.heidenhain.address import address_of
 from edge.controls.heidenhain.check import describe
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.controls.heidenhain.connection import HeidenhainConnection
@@ -28,4 +29,5 @@ ADAPTER = Adapter(
     describe=describe,
     draft=draft,
     sample_config=Path(__file__).with_name("heidenhain.toml"),
+    address=address_of,
 )

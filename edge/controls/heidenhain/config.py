@@ -30,16 +30,16 @@ class ToolSource(StrEnum):
 
 def _lsv2(url: str) -> str:
     try:
-        address_of(url)
+        host_and_port(url)
     except EdgeError as error:
         raise ValueError(str(error)) from None
     return url
 
 
-def address_of(url: str) -> tuple[str, int]:
+def host_and_port(url: str) -> tuple[str, int]:
     """Host and port of an address.
 
-    >>> address_of("lsv2://tnc640"), address_of("lsv2://10.0.0.7:19001")
+    >>> host_and_port("lsv2://tnc640"), host_and_port("lsv2://10.0.0.7:19001")
     (('tnc640', 19000), ('10.0.0.7', 19001))
     """
     try:
@@ -72,7 +72,10 @@ def _plc(addresses: dict[str, str]) -> dict[str, str]:
 
 
 class HeidenhainConfig(Section):
-    """The control and what is read. Without `plc` nobody logs in as PLCDEBUG, without `program_text` nobody as FILE."""
+    """The control and what is read.
+
+    Without `plc` nobody logs in as PLCDEBUG, without `program_text` and `tool_table` nobody as FILE.
+    """
 
     url: Annotated[str, AfterValidator(_lsv2)] = f"lsv2://127.0.0.1:{PORT}"
     interval_ms: int = Field(default=250, ge=50, le=60_000)
@@ -80,6 +83,9 @@ class HeidenhainConfig(Section):
     tool_number_from: ToolSource = ToolSource.AUTO
     program_text: bool = True
     program_kib_max: int = Field(default=512, ge=1, le=1024)
+    tool_table: str = Field(default="", max_length=200, pattern=r"^([A-Za-z0-9_]+:[^\x00]+)?$")
+    tool_table_interval_s: float = Field(default=30.0, ge=1, le=86_400)
+    slow_interval_ms: int = Field(default=1000, ge=50, le=600_000)  # [variables] and [plc]
     clock_interval_s: float = Field(default=10.0, ge=0, le=3600)  # 0: the clock is not read, and nobody logs in as DIAGNOSTICS
     clock_utc_offset_h: float = Field(default=0.0, ge=-14, le=14)  # what the control's seconds are ahead of UTC
     plc: Annotated[dict[str, str], AfterValidator(_plc)] = Field(default_factory=dict)

@@ -19,6 +19,7 @@ from edge.controls.heidenhain.config import Config
 from edge.controls.heidenhain.control import Control
 from edge.controls.heidenhain.cursor import Cursor
 from edge.controls.heidenhain.klartext import read_program
+from edge.controls.heidenhain.tool_table import read_table
 from edge.errors import ConnectionLostError
 from edge.sample import ClockReading
 from edge.sweep import Fact, Hole, Sweep
@@ -67,6 +68,7 @@ class HeidenhainConnection:
         self._programs_seen_s = 0.0
         self._try_again_s = clock()
         self._was_running = False
+        self._table_stamp, self._table_due_s, self._slow_due_s = "", clock(), clock()
         self.reconnects = 0
         self.last_error = ""
 
@@ -108,12 +110,18 @@ class HeidenhainConnection:
         control = self._control or self._connected()
         began_ms = self._now_ms()
         control.link.begin(self._config.source.timeout_s)
-        facts = control.look()
+        now_s = self._clock()
+        is_slow = self._is_new or now_s >= self._slow_due_s
+        if is_slow:
+            self._slow_due_s = now_s + self._config.source.slow_interval_ms / 1000 - self._config.source.interval_ms / 2000
+        facts = control.look(is_slow=is_slow)
         t_ms, asked = (began_ms + self._now_ms()) // 2, len(facts)
         if self._is_new:
             facts.append(Fact("control", control.name))
         if self._config.source.program_text:
             facts += self._texts(control, facts)
+        if self._config.source.tool_table:
+            facts += self._table(control)
         control.link.begin(self._config.source.timeout_s)
         clock = self._clock_reading(control)
         holes = self._hole(t_ms)
@@ -147,7 +155,7 @@ class HeidenhainConnection:
             raise ConnectionLostError("closed")
         control.open()
         self._programs.clear()
-        self._is_new = True
+        self._is_new, self._table_stamp, self._table_due_s = True, "", self._clock()
         return control
 
     def _lost(self, error: Exception) -> None:
@@ -192,6 +200,20 @@ class HeidenhainConnection:
                 if known is None or stamp not in ("", known):
                     texts.append(self._text(control, path, stamp))
         return texts
+
+    def _table(self, control: Control) -> list[Fact]:
+        """The tool table, where it was saved since it was read. Looks wait for it."""
+        now_s, path = self._clock(), self._config.source.tool_table
+        if now_s < self._table_due_s:
+            return []
+        self._table_due_s = now_s + self._config.source.tool_table_interval_s
+        control.link.begin(self._config.source.timeout_s)
+        stamp = control.file_stamp(path)
+        if stamp and stamp == self._table_stamp:
+            return []
+        table = control.tool_table(path)
+        self._table_stamp = stamp if isinstance(table.value, str) and not read_table(table.value).fault else ""
+        return [table]
 
     def _text(self, control: Control, path: str, stamp: str) -> Fact:
         """The text of a program. One that did not come whole is asked for again after a while."""

@@ -2,7 +2,8 @@
 
 pyLSV2 is started with safe_mode=False, since its safe mode refuses the log-in DNC and then answers None to nearly everything;
 that nothing is written is seen to in `link`, below it. Which log-ins are asked for depends on the configuration: INSPECT and
-DNC always, FILE for the program's text, PLCDEBUG where there is a PLC address, DIAGNOSTICS for the clock.
+DNC always, FILE for the program's text and the tool table, PLCDEBUG where there is a PLC address, DATA where there is a data
+path, DIAGNOSTICS for the clock.
 
 What a control refuses with a code that says "not known", "not allowed" or "no such address" is not asked for a minute, and is
 reported as refused at each look. Other codes concern one look only.
@@ -11,6 +12,7 @@ reported as refused at each look. Other codes concern one look only.
 import importlib
 import json
 import logging
+import math
 import os
 import struct
 from collections.abc import Callable
@@ -19,7 +21,9 @@ from functools import partial
 from types import ModuleType
 from typing import Any
 
-from edge.controls.heidenhain.config import Config, ToolSource, address_of
+from edge.alarm_list import ListedAlarm, alarms_text
+from edge.controls.heidenhain.address import address_of
+from edge.controls.heidenhain.config import Config, ToolSource, host_and_port
 from edge.controls.heidenhain.link import ReadOnlyLink
 from edge.controls.heidenhain.plc import PlcAddress
 from edge.errors import ConfigError, ConnectionLostError
@@ -33,6 +37,7 @@ NOT_SOON = frozenset({20, 22, 23, 24, 31, 32, 40, 49, 50, 52, 59, 63, 67, 72})
 NO_NEXT_ERROR = 57
 MESSAGES_MAX = 16
 ONLY_ITNC = "only the iTNC 530 tells it over LSV2"
+ONLY_ITNC_PATHS = "only the iTNC 530 has data paths; name a PLC address"
 Read = Callable[[], Any]
 
 
@@ -47,11 +52,14 @@ def library() -> ModuleType:
 def logins_of(config: Config) -> tuple[str, ...]:
     """The log-ins that are asked for."""
     source = config.source
+    addresses = [address_of(one) for one in config.chosen]
+    by_path = [isinstance(address, str) for address in addresses]
     return (
         "INSPECT",
         "DNC",
-        *(("FILE",) if source.program_text else ()),
-        *(("PLCDEBUG",) if source.plc else ()),
+        *(("FILE",) if source.program_text or source.tool_table else ()),
+        *(("PLCDEBUG",) if source.plc or not all(by_path) else ()),
+        *(("DATA",) if any(by_path) else ()),
         *(("DIAGNOSTICS",) if source.clock_interval_s else ()),
     )
 
@@ -72,12 +80,13 @@ class Control:
         self._pylsv2 = library()
         self._password = plc_password(config)
         self._logins = logins_of(config)
-        host, port = address_of(config.source.url)
+        host, port = host_and_port(config.source.url)
         self.link = ReadOnlyLink(host, port, logins=self._logins, patience_s=patience_s, clock=clock, pylsv2=self._pylsv2)
         self._lsv2 = self._client(port)
         self._no_login: dict[str, str] = {}
         self._refused: dict[str, tuple[str, float]] = {}  # why, and when it is asked for again
         self._addresses = {name: PlcAddress.parse(text) for name, text in config.source.plc.items()}
+        self._chosen = {one.signal: address_of(one) for one in config.chosen}
 
     def _client(self, port: int) -> Any:
         """PyLSV2 on our link. The socket that it made for itself was never connected."""
@@ -122,8 +131,8 @@ class Control:
         """Return whether it may tell its tool and its error messages: an iTNC 530, or a control that is not known."""
         return bool(self._lsv2.versions.is_itnc() or self._lsv2.versions.type.name == "UNKNOWN")
 
-    def look(self) -> list[Fact]:
-        """Everything that is read at each look."""
+    def look(self, *, is_slow: bool = True) -> list[Fact]:
+        """Everything that is read at each look; with `is_slow` also what [variables] and [plc] name."""
         state = self._ask("program_state", lambda: int(self._lsv2.program_status()))
         if state[0].fault and self._was_refused() and int(self.link.last_error.e_code) == NO_PRIVILEGE:
             raise ConnectionLostError("the control has taken back the log-in DNC; is external access still permitted?")
@@ -137,13 +146,54 @@ class Control:
         source = self._config.source.tool_number_from
         wants_tool = source is ToolSource.CONTROL or (source is ToolSource.AUTO and "tool_number" not in self._addresses)
         if wants_tool and self.tells_tool:
-            facts += self._ask("tool", lambda: int(self._lsv2.spindle_tool_status().number))
+            facts += self._tool()
         elif source is ToolSource.CONTROL:
             facts.append(Fact("tool", None, ONLY_ITNC))
-        facts += self._ask("errors", self._errors) if self.tells_tool else [Fact("errors", None, ONLY_ITNC)]
+        facts += self._messages()
         for name, address in self._addresses.items():
             facts += self._ask(f"plc:{name}", partial(self._plc, address), needs="PLCDEBUG")
+        for signal, chosen in self._chosen.items() if is_slow else ():
+            facts += self._value_at(f"chosen:{signal}", chosen)
         return facts
+
+    def _value_at(self, key: str, address: PlcAddress | str) -> list[Fact]:
+        if isinstance(address, PlcAddress):
+            return self._ask(key, partial(self._plc, address), needs="PLCDEBUG")
+        if not self.tells_tool:
+            return [Fact(key, None, ONLY_ITNC_PATHS)]
+        return self._ask(key, lambda: self._lsv2.read_data_path(address), needs="DATA")
+
+    def _tool(self) -> list[Fact]:
+        """The tool in the spindle, with its length and radius where the answer has room for them."""
+        (told,) = self._ask("tool", self._lsv2.spindle_tool_status)
+        tool: Any = told.value
+        if tool is None:
+            return [told]
+        if (tool.length, tool.radius) == (-1, -1):  # what pyLSV2 has before it reads
+            return [Fact("tool", int(tool.number))]
+        return [
+            Fact("tool", int(tool.number)),
+            *(self._length(f"tool_{name}", getattr(tool, name)) for name in ("length", "radius")),
+        ]
+
+    @staticmethod
+    def _length(key: str, value: float) -> Fact:
+        return Fact(key, value) if math.isfinite(value) else Fact(key, None, "answers what is no length")
+
+    def _messages(self) -> list[Fact]:
+        keys = ("errors", "error_list")
+        if not self.tells_tool:
+            return [Fact(key, None, ONLY_ITNC) for key in keys]
+        (told,) = self._ask("errors", self._errors)
+        messages: Any = told.value
+        if messages is None:
+            return [Fact(key, None, told.fault) for key in keys]
+        text = "; ".join(f"{message.code} {message.text}".strip() for message in messages)
+        return [Fact("errors", text), Fact("error_list", alarms_text(messages))]
+
+    def tool_table(self, path: str) -> Fact:
+        """The text of the tool table, or why it cannot be had."""
+        return self._ask(f"table:{path}", lambda: self._text(path), needs="FILE", keep=False)[0]._replace(key="tool_table")
 
     def clock(self, wall_ms: Callable[[], int]) -> ClockReading | None:
         """The control's date and time in whole seconds, rounded down; None where it does not tell."""
@@ -216,9 +266,9 @@ class Control:
         axes: Any = told.value
         return [Fact(f"axis:{name}", place) for name, place in axes.items()] if axes else [Fact("axes", None, told.fault)]
 
-    def _errors(self) -> str:
+    def _errors(self) -> tuple[ListedAlarm, ...]:
         messages = self._lsv2.get_error_messages()[:MESSAGES_MAX]
-        return "; ".join(f"{message.e_number} {message.e_text}".strip() for message in messages)
+        return tuple(ListedAlarm(str(message.e_number), str(message.e_text), active=True) for message in messages)
 
     def _plc(self, address: PlcAddress) -> bool | int | str | None:
         place = address.lies_at(self._lsv2.parameters)

@@ -20,20 +20,22 @@ from typing import NamedTuple
 from edge.config import SignalSection
 from edge.controls.heidenhain.config import TOOL_CHANGE, Config, ToolSource
 from edge.controls.heidenhain.klartext import Kind, read_program
-from edge.controls.heidenhain.meaning import ONLY_PLC, in_words, signal_of, source_of, target_of
+from edge.controls.heidenhain.meaning import ONLY_PLC, chosen_of, in_words, signal_of, source_of, target_of
 from edge.controls.heidenhain.tool_flow import BEFORE, PROGRAM_CALLED, Token, Tokens, flow_of, speed_of, tool_of
+from edge.controls.heidenhain.tool_table import FEEDS, NOT_READ, ToolTable, nulls, read_table
 from edge.place import Place
 from edge.reading import Target, bad, read_value
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet, observations_of
 from edge.sweep import Fact, Plain, Sweep, SweepPosition, take
 from edge.tool_change import CUE
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import Kind as SignalKind
 
 TEXTS_MAX = 2
 RUNNING = 0
 GOES_ON = (RUNNING, 1, 4)  # running, stopped or interrupted: the program is at this block
 STARTED_INSIDE = "the program was started after its TOOL CALL, in block"
-NO_SOURCE = "no telegram of LSV2 tells it; name its PLC address in [heidenhain.plc]"
+NO_SOURCE = "no telegram of LSV2 tells it; name its PLC address in [heidenhain.plc]"  # how: docs/edge-heidenhain.md
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class Cursor:
     """The parser's position. `texts`: path and text of the programs; `tool`, `speed`: what was seen last, None: not known.
 
     `unknown`: why the tool is not known; `state`: of the program in the last look; `at_call`: whether that was in a running TOOL
-    CALL; `offers`: what was declared.
+    CALL; `offers`: what was declared; `table`: the control's tools.
     """
 
     position: SweepPosition = field(default_factory=SweepPosition)
@@ -52,6 +54,7 @@ class Cursor:
     state: int | None = None
     at_call: bool = False
     offers: tuple[Offer, ...] = ()
+    table: ToolTable = NOT_READ
 
 
 class Look(NamedTuple):
@@ -105,7 +108,10 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
         samples.append(_derived("nc_block", where.block, where.fault, look))
         after, speed = _speed(after, where)
         samples.append(_derived("spindle_rpm_cmd", speed, "no speed of a TOOL CALL is known", look))
+        samples.append(_derived("program_comment", *_comment(cursor, look), look))
     samples += tool_samples
+    if config.source.tool_table:
+        samples += _of_table(cursor.table, tool_samples, look)
     offers = _offers(cursor.offers, look)
     samples += _missing(cursor.offers, offers, samples, look)
     samples = [sample for sample in samples if _is_wanted(config, sample.signal)]
@@ -136,7 +142,38 @@ def _with_texts(cursor: Cursor, sweep: Sweep) -> Cursor:
             path = fact.key.removeprefix("text:")
             texts = [entry for entry in texts if entry[0] != path]
             texts.append((path, fact.value if isinstance(fact.value, str) else "", fact.fault))
+    table = next((fact for fact in sweep.facts if fact.key == "tool_table"), None)
+    if table is not None:
+        told = read_table(table.value) if isinstance(table.value, str) else ToolTable(fault=table.fault)
+        cursor = replace(cursor, table=told)
     return replace(cursor, texts=tuple(texts[-TEXTS_MAX:]))
+
+
+def _comment(cursor: Cursor, look: Look) -> tuple[str | None, str]:
+    """The comment in the head of the selected program, "" where there is none; and why it is not known."""
+    selected = look.facts["program"].value if "program" in look.facts else None
+    found = next((entry for entry in cursor.texts if entry[0] == selected), None)
+    if found is None or not found[1]:
+        return None, (found[2] if found else "") or "the program's text was not read yet"
+    program = read_program(found[1])
+    if not program.blocks:
+        return None, program.fault
+    head = program.block(1) or ""
+    return (head[1:].strip() if head.startswith((";", "*")) else ""), ""
+
+
+def _of_table(table: ToolTable, tool_samples: list[EdgeSample], look: Look) -> list[EdgeSample]:
+    """The row of the tool in the spindle."""
+    tool = next((sample for sample in tool_samples if sample.signal == "tool_number"), None)
+    number = tool.value if tool is not None else None
+    if isinstance(number, int) and number:
+        outcomes = table.outcomes(number)
+    else:
+        outcomes = nulls("no tool in the spindle" if number == 0 else f"{UNAVAILABLE}: the tool in the spindle is not known")
+    return [
+        EdgeSample(name, value, look.sweep.t_ms, quality, reason, look.sweep.number, 0, look.is_baseline)
+        for name, (value, quality, reason) in outcomes
+    ]
 
 
 def _where(cursor: Cursor, look: Look) -> Where:
@@ -163,6 +200,7 @@ def _plain(look: Look) -> tuple[list[EdgeSample], int]:
     for key, fact in look.facts.items():
         name = signal_of(key)
         is_another = not key.startswith("plc:") and f"plc:{name}" in look.facts  # the PLC address was asked for by name
+        is_another |= bool(look.config.source.tool_table) and name in FEEDS.values()  # the table tells it, with its wear
         if name not in (None, "tool_number") and not is_another:
             samples.append(_sample(name, fact, look))
     return samples, int(f"plc:{TOOL_CHANGE}" in look.facts)
@@ -170,6 +208,8 @@ def _plain(look: Look) -> tuple[list[EdgeSample], int]:
 
 def _sample(name: str, fact: Fact, look: Look) -> EdgeSample:
     value = in_words(fact.key, fact.value)
+    if isinstance(value, bool) and target_of(fact.key, name, look.config).known.kind is SignalKind.NUMBER:
+        value = int(value)  # a marker that is to be a number
     if fact.fault:
         outcome = bad(fact.fault)
     elif value is None:
@@ -320,6 +360,10 @@ def _offers(before: tuple[Offer, ...], look: Look) -> tuple[Offer, ...]:
     if look.config.source.program_text:
         found.setdefault("nc_block", _offer(look.config, "nc_block", "program text"))
         found.setdefault("spindle_rpm_cmd", _offer(look.config, "spindle_rpm_cmd", "program text"))
+        found.setdefault("program_comment", _offer(look.config, "program_comment", "program text"))
+    if look.config.source.tool_table:
+        for column, name in FEEDS.items():
+            found[name] = _offer(look.config, name, f"tool table {column}")
     route = _route(look)
     if route:
         source = "program text" if route == "text" else source_of(route, look.config)
@@ -330,6 +374,9 @@ def _offers(before: tuple[Offer, ...], look: Look) -> tuple[Offer, ...]:
 
 
 def _offer(config: Config, name: str, source: str) -> Offer:
+    chosen = chosen_of(name, config)
+    if chosen is not None:
+        return chosen.offer(source)
     section = config.signals.get(name, SignalSection())
     return Offer(name, source, section.native_unit, section.low, section.high)
 

@@ -47,6 +47,9 @@ def draft(url: str, device: str = "") -> str:
     lines += [f"#   {offer.signal}: {_one_line(last[offer.signal].reason or '')[:120]}" for offer in silent] or ["#   none"]
     lines += [
         "",
+        "# Length, radius, wear and age of the tool: read from the control's table, if you name it (docs/edge-heidenhain.md):",
+        f"# [heidenhain] tool_table = '{_tool_table(control)}'",
+        "",
         "# The addresses are the machine builder's: ask for his PLC lists, or see them on the control (docs/edge-heidenhain.md).",
         "# [heidenhain.plc]",
         '# tool_number = "W1000"',
@@ -55,6 +58,11 @@ def draft(url: str, device: str = "") -> str:
         '# spindle_load_pct = "W1008"  # with [signals.spindle_load_pct] scale = 0.1 where it counts tenths',
     ]
     return "\n".join(lines) + "\n"
+
+
+def _tool_table(control: str) -> str:
+    """The usual path of the tool table, by what the control calls itself."""
+    return "TNC:\\TOOL.T" if control.startswith("iTNC") else "TNC:\\table\\tool.t"
 
 
 def _clock_lines(sweep: Sweep) -> list[str]:

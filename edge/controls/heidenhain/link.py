@@ -37,6 +37,7 @@ READS = {
     "R_CI": ("S_CI",),
     "R_RI": ("S_RI",),
     "R_MB": ("S_MB",),
+    "R_DP": ("S_DP",),
     "R_FI": ("S_FI",),
     "R_FL": ("S_FL", "T_FD"),
     "R_DT": ("S_DT",),

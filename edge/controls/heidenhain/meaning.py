@@ -12,6 +12,7 @@
 import re
 from functools import lru_cache
 
+from edge.chosen import Chosen
 from edge.config import SignalSection
 from edge.controls.heidenhain.config import Config
 from edge.errors import ConfigError
@@ -34,6 +35,9 @@ SIGNALS = {
     "rapid_override": "rapid_override_pct",
     "tool": "tool_number",
     "errors": "alarm",
+    "error_list": "alarms",
+    "tool_length": "tool_length_mm",
+    "tool_radius": "tool_radius_mm",
 }
 SOURCES = {
     "program_state": "R_RI 26",
@@ -45,9 +49,13 @@ SOURCES = {
     "rapid_override": "R_RI 25",
     "tool": "R_RI 51",
     "errors": "R_RI 27, 28",
+    "error_list": "R_RI 27, 28",
+    "tool_length": "R_RI 51",
+    "tool_radius": "R_RI 51",
 }
 # What no LSV2 telegram tells, on any control: only the builder of the machine knows in which PLC address it lies.
 ONLY_PLC = ("spindle_rpm", "spindle_load_pct", "feed_mm_min")
+BACKSLASHES = "\\/"  # a data path begins with either
 _ROTARY = frozenset("abc")
 
 
@@ -58,7 +66,7 @@ def signal_of(key: str) -> str | None:
     ['axis_z_pos_mm', 'axis_c_pos_deg', 'spindle_rpm', None, None]
     """
     kind, _, name = key.partition(":")
-    if kind == "plc":
+    if kind in ("plc", "chosen"):
         return name if _is_signal(name) else None
     if kind == "axis":
         axis = name.lower()
@@ -81,7 +89,15 @@ def source_of(key: str, config: Config) -> str:
     kind, _, name = key.partition(":")
     if kind == "plc":
         return f"PLC {config.source.plc.get(name, '?')}"
+    if kind == "chosen":
+        chosen = chosen_of(name, config)
+        return "?" if chosen is None else f"{'R_DP' if chosen.address[0] in BACKSLASHES else 'PLC'} {chosen.address}"
     return f"R_RI 22 {name}" if kind == "axis" else SOURCES.get(key, key)
+
+
+def chosen_of(name: str, config: Config) -> Chosen | None:
+    """Return what [variables] or [plc] say of this signal."""
+    return next((one for one in config.chosen if one.signal == name), None)
 
 
 def in_words(key: str, value: Plain) -> Plain:
@@ -97,6 +113,9 @@ def in_words(key: str, value: Plain) -> Plain:
 
 def target_of(key: str, name: str, config: Config) -> Target:
     """Return how the value of a fact becomes that of a signal."""
+    chosen = chosen_of(name, config) if key.startswith("chosen:") else None
+    if chosen is not None:
+        return chosen.target(key)
     section = config.signals.get(name, SignalSection())
     known = signal(name)
     factor, offset = conversion(section.native_unit, known.unit) if section.native_unit else (1.0, 0.0)

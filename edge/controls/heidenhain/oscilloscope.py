@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from edge.controls.heidenhain.config import address_of
+from edge.controls.heidenhain.config import host_and_port
 from edge.controls.heidenhain.control import library
 from edge.controls.heidenhain.link import SCOPE_READS, ReadOnlyLink
 from edge.errors import ConnectionLostError, EdgeError
@@ -65,7 +65,7 @@ class Oscilloscope:
     ) -> None:
         self._url, self._password, self._timeout_s = url, password, timeout_s
         self._pylsv2 = library()
-        host, port = address_of(url)
+        host, port = host_and_port(url)
         self._link = ReadOnlyLink(
             host, port, logins=LOGINS, patience_s=timeout_s, clock=clock, pylsv2=self._pylsv2, more_reads=SCOPE_READS
         )

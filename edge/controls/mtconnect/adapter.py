@@ -14,6 +14,7 @@ from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection
 from edge.controls.mtconnect.cursor import parse, place, resume, start
 from edge.controls.mtconnect.draft import draft
+from edge.controls.mtconnect.mapping import address_of
 
 ADAPTER = Adapter(
     name="mtconnect",
@@ -27,4 +28,5 @@ ADAPTER = Adapter(
     describe=describe,
     draft=draft,
     sample_config=Path(__file__).with_name("mtconnect.toml"),
+    address=address_of,
 )

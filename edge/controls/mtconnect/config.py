@@ -19,11 +19,15 @@ def _http(url: str) -> str:
 
 
 class MtconnectConfig(Section):
-    """The agent and how it is asked. Empty `device`: the only one; empty `spindle`: see `edge.controls.mtconnect.mapping`."""
+    """The agent and how it is asked. Empty `device`: the only one; empty `spindle`: see `edge.controls.mtconnect.mapping`.
+
+    tool_asset: the data item that names the tool in the spindle; empty: the first TOOL_ASSET_ID
+    """
 
     url: Annotated[str, AfterValidator(_http)] = "http://127.0.0.1:5000"
     device: str = ""
     spindle: str = ""
+    tool_asset: str = ""
     count: int = Field(default=1000, ge=1, le=100_000)
     interval_ms: int = Field(default=100, ge=1, le=60_000)
     heartbeat_ms: int = Field(default=2000, ge=100, le=60_000)

@@ -20,10 +20,12 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import urlsplit
+from xml.sax.saxutils import escape
 
 from edge.adapter import Wait
-from edge.controls.mtconnect.cursor import Config, Cursor, Phase, Request, next_request
+from edge.controls.mtconnect.cursor import Config, Request, next_request
 from edge.controls.mtconnect.multipart import MultipartParser
+from edge.controls.mtconnect.state import Cursor, Phase
 from edge.controls.mtconnect.stream import Stream, target_of
 from edge.controls.mtconnect.xml import DOCUMENT_BYTES_MAX
 from edge.errors import ConfigError, ConnectionLostError
@@ -94,6 +96,10 @@ class MtconnectConnection:
             try:
                 yield from self._answer(agent, next_request(self._config, asked, streams=self._streams))
             except (ConnectionLostError, OSError) as error:
+                if asked.phase is Phase.ASSET and self._cursor == asked:  # told to the parser, which goes on without it
+                    yield error_document(str(error) or type(error).__name__)
+                    yield Wait(None)
+                    continue
                 yield Wait(None)  # what comes next connects anew
                 if not self._closed.is_set():
                     self._lost(error)
@@ -110,6 +116,8 @@ class MtconnectConnection:
     def _setbacks_after(self, asked: Cursor) -> int:
         """Return how often in a row the agent has sent us back, as one does that is another instance in each document."""
         phase = self._cursor.phase
+        if Phase.ASSET in (asked.phase, phase):
+            return self._setbacks
         if asked.phase is Phase.SAMPLE and phase is Phase.SAMPLE:
             return 0
         return self._setbacks + (list(Phase).index(phase) < list(Phase).index(asked.phase))
@@ -186,6 +194,13 @@ class MtconnectConnection:
         self._heard_s = self._clock()
         self._failures = 0
         return document
+
+
+def error_document(why: str) -> bytes:
+    """The answer that the agent would have given, had it answered."""
+    return (
+        f'<MTConnectError><Header/><Errors><Error errorCode="NO_ANSWER">{escape(why)}</Error></Errors></MTConnectError>'.encode()
+    )
 
 
 def _await(sock: socket.socket, seconds: float) -> None:

@@ -3,6 +3,8 @@
     PROBE ──devices──► CURRENT ──streams──► SAMPLE ──streams──► SAMPLE …
       ▲                   ▲                   │
       └── new instance ───┼─── out of range ──┘
+                                              │ another tool, or its asset has changed
+                                            ASSET, and on with SAMPLE
 
 Each observation is taken once, by its sequence number, so a document that comes twice gives nothing new. What is asked for next
 always starts at the header's nextSequence, never at the last element, which in a document grouped by component is rarely the
@@ -18,67 +20,35 @@ An edge that was killed and started again knows its place (`resume`) but none of
 that place is then its baseline, and sampling resumes at the place; what the agent has dropped of it is a hole like any other.
 """
 
-from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import replace
 from typing import NamedTuple
 from urllib.parse import quote
 
 from edge.config import EdgeConfig
-from edge.controls.mtconnect.alarm import Alarm, all_unavailable, observe, text_of
+from edge.controls.mtconnect.alarm import Alarm
+from edge.controls.mtconnect.asset_watch import AssetWatch, watch_of
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.documents import (
+    AssetsDocument,
     DevicesDocument,
     ErrorDocument,
     Header,
-    Observation,
     StreamsDocument,
     parse_document,
 )
 from edge.controls.mtconnect.mapping import assign
 from edge.controls.mtconnect.model import DeviceModel
+from edge.controls.mtconnect.state import Cursor, Phase
+from edge.controls.mtconnect.taking import alarm_samples, clock_of, is_ours, observed, take, tool_samples
+from edge.controls.mtconnect.tool_asset import SIGNALS as TOOL_SIGNALS
+from edge.controls.mtconnect.tool_asset import without_tool
 from edge.errors import ConfigError, DocumentError
 from edge.place import EDGE_RESTARTED, Place
-from edge.reading import Target, read
-from edge.sample import UNAVAILABLE, ClockReading, Drop, EdgeSample, Gap, Offer, SampleSet
-from sparkplug.quality import Quality
+from edge.sample import Drop, Gap, Offer, SampleSet
 
 ATTEMPTS_BEFORE_PROBE = 3
-DOCUMENT_MS_MAX = 500  # from its making to the edge, for most documents; those that take longer are outvoted
 Config = EdgeConfig[MtconnectConfig]
-
-
-class Phase(StrEnum):
-    """The document that is asked for next."""
-
-    PROBE = "probe"
-    CURRENT = "current"
-    SAMPLE = "sample"
-
-
-@dataclass(frozen=True, slots=True)
-class Cursor:
-    """The parser's position. `hole` is why a baseline is needed, "" where none is; `attempt` counts refused frames in a row.
-
-    left_instance, left_sequence: the place that was given up for another instance, as long as nothing of that one was taken
-    """
-
-    phase: Phase = Phase.PROBE
-    instance_id: str = ""
-    next_sequence: int = 0
-    buffer_size: int = 0
-    device_name: str = ""
-    device_uuid: str = ""
-    targets: tuple[Target, ...] = ()
-    availability_id: str = ""
-    conditions: int = 0
-    alarms: tuple[Alarm, ...] = ()
-    publishes_alarm: bool = True
-    hole: str = ""
-    attempt: int = 0
-    left_instance: str = ""
-    left_sequence: int = 0
 
 
 class Request(NamedTuple):
@@ -95,7 +65,7 @@ def start(_config: Config) -> Cursor:
 
 def place(cursor: Cursor) -> Place | None:
     """The place up to which everything is taken; None while nothing is."""
-    taken = cursor.phase is Phase.SAMPLE and cursor.next_sequence > 0
+    taken = cursor.phase in (Phase.SAMPLE, Phase.ASSET) and cursor.next_sequence > 0
     return Place(cursor.instance_id, cursor.next_sequence) if taken else None
 
 
@@ -111,6 +81,8 @@ def next_request(config: Config, cursor: Cursor, *, streams: bool = True) -> Req
     device = quote(cursor.device_name or cursor.device_uuid, safe="")
     if cursor.phase is Phase.CURRENT:
         return Request(f"/{device}/current")
+    if cursor.phase is Phase.ASSET:
+        return Request(f"/asset/{quote(cursor.asset.asset_id, safe='')}")
     count = min(config.source.count, cursor.buffer_size or config.source.count)
     parameters: tuple[tuple[str, str | int], ...] = (("from", cursor.next_sequence), ("count", count))
     if streams:
@@ -124,23 +96,20 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
         document = parse_document(raw)
         if isinstance(document, DevicesDocument):
             after, given = _devices(config, cursor, document)
+        elif isinstance(document, AssetsDocument):
+            after, given = _asset(cursor, document)
         elif isinstance(document, ErrorDocument):
             after, given = _error(cursor, document)
         else:
             after, given = _streams(cursor, document)
     except (DocumentError, ConfigError) as error:
         return _refused(cursor, str(error))
-    return after, given if given.clock is not None else replace(given, clock=_clock(document.header))
-
-
-def _clock(header: Header) -> ClockReading | None:
-    """Return what the agent's clock showed; `edge.clock.offset` puts it beside the time at which the document arrived."""
-    if header.created_ms is None:
-        return None
-    return ClockReading(header.created_ms, 0, DOCUMENT_MS_MAX, header.resolution_ms)
+    return after, given if given.clock is not None else replace(given, clock=clock_of(document.header))
 
 
 def _refused(cursor: Cursor, error: str) -> tuple[Cursor, SampleSet]:
+    if cursor.phase is Phase.ASSET:  # it is not worth a second question
+        return _on_with_samples(cursor), SampleSet(error=error, instance=cursor.instance_id or None)
     attempt = cursor.attempt + 1
     phase = Phase.PROBE if attempt % ATTEMPTS_BEFORE_PROBE == 0 and cursor.phase is Phase.CURRENT else cursor.phase
     return replace(cursor, attempt=attempt, phase=phase), SampleSet(error=error, instance=cursor.instance_id or None)
@@ -162,11 +131,14 @@ def _devices(config: Config, cursor: Cursor, document: DevicesDocument) -> tuple
     if cursor.phase is not Phase.PROBE:
         return cursor, SampleSet(instance=cursor.instance_id)
     device = choose_device(document.devices, config.source.device)
-    assignment = assign(device, config.signals, config.source.spindle)
-    section = config.signals.get("alarm")
+    assignment = assign(device, config.signals, config.source.spindle, config.chosen)
     conditions = sum(item.category == "CONDITION" for item in device.items)
-    publishes_alarm = conditions > 0 and (section is None or section.publish)
-    offers = assignment.offers + ((Offer("alarm", "conditions"),) if publishes_alarm else ())
+    watch = watch_of(device, config.source.tool_asset)
+    fed = {offer.signal for offer in assignment.offers}
+    alarm_signals = tuple(name for name in ("alarm", "alarms") if conditions and _is_published(config, name))
+    tool_signals = tuple(name for name in TOOL_SIGNALS if watch.tool_item and name not in fed and _is_published(config, name))
+    offers = assignment.offers + tuple(Offer(name, "conditions") for name in alarm_signals)
+    offers += tuple(Offer(name, "asset of the tool in the spindle") for name in tool_signals)
     after = replace(
         cursor,
         phase=Phase.CURRENT,
@@ -177,11 +149,40 @@ def _devices(config: Config, cursor: Cursor, document: DevicesDocument) -> tuple
         targets=assignment.targets,
         availability_id=next((item.id for item in device.items if item.type == "AVAILABILITY"), ""),
         conditions=conditions,
-        publishes_alarm=publishes_alarm,
+        alarm_signals=alarm_signals,
+        chosen=assignment.chosen,
+        tool_signals=tool_signals,
+        asset=watch if tool_signals else AssetWatch(),
     )
     if cursor.instance_id not in ("", document.header.instance_id):
         after = _new_instance(after, cursor, document.header)
     return after, SampleSet(offers=offers, instance=document.header.instance_id)
+
+
+def _is_published(config: Config, name: str) -> bool:
+    section = config.signals.get(name)
+    return section is None or section.publish
+
+
+def _asset(cursor: Cursor, document: AssetsDocument) -> tuple[Cursor, SampleSet]:
+    """The tool in the spindle; an asset that nobody waits for says nothing."""
+    if cursor.phase is not Phase.ASSET:
+        return cursor, SampleSet(instance=cursor.instance_id)
+    tool = next((tool for tool in document.tools if tool.id == cursor.asset.asset_id), None)
+    if tool is None:
+        return _no_asset(cursor, "the agent answers with another")
+    samples = tuple(tool_samples(cursor, tool.outcomes(), cursor.asset))
+    return _on_with_samples(cursor), SampleSet(samples, received=len(samples), instance=cursor.instance_id)
+
+
+def _no_asset(cursor: Cursor, why: str) -> tuple[Cursor, SampleSet]:
+    missing = without_tool(f"the asset of tool {cursor.asset.asset_id} cannot be read: {why}"[:300])
+    samples = tuple(tool_samples(cursor, missing, cursor.asset, observations=0))
+    return _on_with_samples(cursor), SampleSet(samples, instance=cursor.instance_id)
+
+
+def _on_with_samples(cursor: Cursor) -> Cursor:
+    return replace(cursor, phase=Phase.SAMPLE, asset=cursor.asset.asked())
 
 
 def _new_instance(after: Cursor, before: Cursor, header: Header) -> Cursor:
@@ -202,6 +203,8 @@ def _new_instance(after: Cursor, before: Cursor, header: Header) -> Cursor:
 
 
 def _error(cursor: Cursor, document: ErrorDocument) -> tuple[Cursor, SampleSet]:
+    if cursor.phase is Phase.ASSET:
+        return _no_asset(cursor, f"the agent answers {document}")
     refused, samples = _refused(cursor, f"the agent answers {document}")
     instance = document.header.instance_id
     if instance and cursor.instance_id and instance != cursor.instance_id:
@@ -234,7 +237,7 @@ def _streams(cursor: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleS
         # An agent that answers from the start of its buffer instead of refusing: the same hole as OUT_OF_RANGE.
         refused, samples = _refused(cursor, f"sequence {cursor.next_sequence} wanted, the agent's buffer begins at {first}")
         return replace(refused, phase=Phase.CURRENT, hole="overrun"), samples
-    return _take(cursor, document, floor=cursor.next_sequence, next_sequence=header.next_sequence)
+    return take(cursor, document, floor=cursor.next_sequence, next_sequence=header.next_sequence)
 
 
 def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> tuple[Cursor, SampleSet]:
@@ -243,7 +246,7 @@ def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> 
     if not wanted:
         ready = replace(ready, alarms=())
     if not cursor.hole and not wanted:
-        return _take(ready, document, floor=0, next_sequence=next_sequence, is_baseline=True)
+        return take(ready, document, floor=0, next_sequence=next_sequence, is_baseline=True)
     restarted = cursor.hole == EDGE_RESTARTED
     if restarted and first <= wanted <= next_sequence:
         return _rejoin(ready, document)
@@ -257,7 +260,7 @@ def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> 
         why, wanted = f"sequence numbers went back from {wanted} to {next_sequence}", 0
         ready = replace(ready, next_sequence=0)
     floor = 0 if restarted else wanted  # a restarted edge has the values from before the hole to learn, too
-    after, samples = _take(ready, document, floor=floor, next_sequence=next_sequence, is_baseline=True)
+    after, samples = take(ready, document, floor=floor, next_sequence=next_sequence, is_baseline=True)
     after, samples = _alarms_anew(after, samples, document)
     low = max(wanted, 1)
     found = {o.sequence for o in document.observations if o.sequence is not None and o.sequence >= low}
@@ -268,7 +271,7 @@ def _rejoin(ready: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleSet
     """The restarted edge finds its place: what was taken before is the baseline, and what came since comes again as samples."""
     before = tuple(o for o in document.observations if o.sequence is None or o.sequence < ready.next_sequence)
     older = replace(document, observations=before)
-    after, samples = _take(ready, older, floor=0, next_sequence=ready.next_sequence, is_baseline=True)
+    after, samples = take(ready, older, floor=0, next_sequence=ready.next_sequence, is_baseline=True)
     again = len(document.observations) - len(before)
     dropped = dict(samples.dropped) | ({Drop.DUPLICATE: samples.dropped.get(Drop.DUPLICATE, 0) + again} if again else {})
     return after, replace(samples, received=samples.received + again, dropped=dropped)
@@ -276,90 +279,12 @@ def _rejoin(ready: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleSet
 
 def _alarms_anew(cursor: Cursor, samples: SampleSet, document: StreamsDocument) -> tuple[Cursor, SampleSet]:
     """Take the active conditions as /current shows them after a hole: one that ended in it has left no other trace."""
-    shown = sorted((o for o in document.observations if o.is_condition and _is_ours(cursor, o)), key=lambda o: o.sequence or 0)
+    shown = sorted((o for o in document.observations if o.is_condition and is_ours(cursor, o)), key=lambda o: o.sequence or 0)
     readable = [o for o in shown if o.sequence is not None and o.timestamp_ms is not None]
-    if not readable or not cursor.publishes_alarm:
+    if not readable or not cursor.alarm_signals:
         return cursor, samples
     alarms: tuple[Alarm, ...] = ()
     for o in readable:
-        alarms = observe(alarms, o.data_item_id, o.element, o.native_code, o.value)
-    anew = replace(_alarm_sample(alarms, cursor.conditions, readable[-1], is_baseline=True), observations=0)
-    return replace(cursor, alarms=alarms), replace(samples, samples=(*samples.samples, anew))
-
-
-def _take(
-    cursor: Cursor, document: StreamsDocument, *, floor: int, next_sequence: int, is_baseline: bool = False
-) -> tuple[Cursor, SampleSet]:
-    """The observations from `floor` on, each once, in the order of their sequence."""
-    targets = {target.data_item_id: target for target in cursor.targets}
-    dropped: Counter[str] = Counter()
-    taken: list[EdgeSample] = []
-    alarms, seen, newest, available = cursor.alarms, set[int](), None, None
-    for observation in sorted(document.observations, key=lambda o: o.sequence or 0):
-        sequence, time_ms = observation.sequence, observation.timestamp_ms
-        if sequence is None or time_ms is None:
-            dropped[Drop.UNPARSABLE] += 1
-            continue
-        if sequence < floor or sequence in seen:
-            dropped[Drop.DUPLICATE] += 1
-            continue
-        seen.add(sequence)
-        if not _is_ours(cursor, observation):
-            dropped[Drop.OTHER_DEVICE] += 1
-            continue
-        newest = time_ms if newest is None else max(newest, time_ms)
-        target = targets.get(observation.data_item_id)
-        if observation.data_item_id == cursor.availability_id:
-            available = observation.value != "UNAVAILABLE"
-        if observation.is_condition and cursor.publishes_alarm:
-            alarms = observe(alarms, observation.data_item_id, observation.element, observation.native_code, observation.value)
-            taken.append(_alarm_sample(alarms, cursor.conditions, observation, is_baseline))
-        elif target is None or observation.is_condition:
-            dropped[Drop.UNMAPPED] += 1
-        else:
-            taken.append(_sample(target, observation, is_baseline))
-    after = replace(cursor, alarms=alarms, next_sequence=max(floor, next_sequence, max(seen, default=-1) + 1))
-    backlog = max(0, (document.header.last_sequence or 0) + 1 - after.next_sequence)
-    received = len(document.observations)
-    return after, SampleSet(
-        tuple(taken),
-        received=received,
-        dropped=dict(dropped),
-        instance=cursor.instance_id,
-        backlog=backlog,
-        newest_ms=newest,
-        available=available,
-        clock=_clock(document.header),
-    )
-
-
-def _is_ours(cursor: Cursor, observation: Observation) -> bool:
-    if observation.device_uuid and cursor.device_uuid:
-        return observation.device_uuid == cursor.device_uuid
-    return observation.device_name == cursor.device_name
-
-
-def _sample(target: Target, observation: Observation, is_baseline: bool) -> EdgeSample:
-    assert observation.sequence is not None
-    assert observation.timestamp_ms is not None
-    value, quality, reason = read(target, observation.value)
-    if observation.has_entries and observation.value != "UNAVAILABLE":
-        value, quality, reason = None, Quality.BAD, "several values in one observation"
-    return EdgeSample(
-        target.signal, value, observation.timestamp_ms, quality, reason, observation.sequence, is_baseline=is_baseline
-    )
-
-
-def _alarm_sample(alarms: tuple[Alarm, ...], conditions: int, observation: Observation, is_baseline: bool) -> EdgeSample:
-    assert observation.sequence is not None
-    assert observation.timestamp_ms is not None
-    unknown = all_unavailable(alarms, conditions)
-    return EdgeSample(
-        "alarm",
-        None if unknown else text_of(alarms),
-        observation.timestamp_ms,
-        Quality.BAD if unknown else Quality.GOOD,
-        UNAVAILABLE if unknown else None,
-        observation.sequence,
-        is_baseline=is_baseline,
-    )
+        alarms = observed(alarms, o)
+    anew = alarm_samples(cursor, alarms, readable[-1], is_baseline=True, observations=0)
+    return replace(cursor, alarms=alarms), replace(samples, samples=(*samples.samples, *anew))

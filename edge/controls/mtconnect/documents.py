@@ -13,6 +13,7 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from edge.controls.mtconnect.model import DeviceModel, devices_of
+from edge.controls.mtconnect.tool_asset import ToolAsset, tools_of
 from edge.controls.mtconnect.xml import local_name, local_tag, parse_small, parse_xml
 from edge.errors import DocumentError
 
@@ -50,6 +51,8 @@ class Observation(NamedTuple):
     value: str
     native_code: str
     has_entries: bool
+    native_severity: str = ""
+    entries: tuple[tuple[str, str], ...] = ()  # of a data set: key and value
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,14 @@ class StreamsDocument:
 
 
 @dataclass(frozen=True, slots=True)
+class AssetsDocument:
+    """The answer to /asset: the cutting tools in it."""
+
+    header: Header
+    tools: tuple[ToolAsset, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ErrorDocument:
     """An answer that is none: code and text of each error."""
 
@@ -79,7 +90,7 @@ class ErrorDocument:
         return "; ".join(f"{code}: {text}" if text else code for code, text in self.errors) or "an error without a code"
 
 
-Document = DevicesDocument | StreamsDocument | ErrorDocument
+Document = DevicesDocument | StreamsDocument | AssetsDocument | ErrorDocument
 
 
 def parse_document(raw: bytes) -> Document:
@@ -95,10 +106,12 @@ def parse_document(raw: bytes) -> Document:
         if header.next_sequence is None:
             raise DocumentError("streams document without a nextSequence in its header")
         return StreamsDocument(header, tuple(_observations(root)))
+    if kind == "MTConnectAssets":
+        return AssetsDocument(header, tools_of(root))
     if kind == "MTConnectError":
         errors = tuple((e.get("errorCode", ""), (e.text or "").strip()) for e in root.iter() if e.get("errorCode") is not None)
         return ErrorDocument(header, errors)
-    raise DocumentError(f"root element {kind!r} is none of MTConnectDevices, MTConnectStreams, MTConnectError")
+    raise DocumentError(f"root element {kind!r} is none of MTConnectDevices, MTConnectStreams, MTConnectAssets, MTConnectError")
 
 
 @lru_cache(maxsize=1024)  # the observations of a document have few different times
@@ -173,6 +186,16 @@ def _observation(uuid: str, device_name: str, element: Element, is_condition: bo
         (element.text or "").strip(),
         get("nativeCode", ""),
         len(element) > 0 or kind.endswith(_SEVERAL),
+        get("nativeSeverity", ""),
+        _entries(element) if len(element) else (),
+    )
+
+
+def _entries(element: Element) -> tuple[tuple[str, str], ...]:
+    """The entries of a data set. One that was removed has no value any more."""
+    entries = (entry for entry in element if local_tag(entry.tag) == "Entry")
+    return tuple(
+        (entry.get("key", ""), UNAVAILABLE if entry.get("removed") == "true" else (entry.text or "").strip()) for entry in entries
     )
 
 

@@ -60,7 +60,14 @@ def text_of(url: str, device: DeviceModel, machines: list[DeviceModel]) -> str:
         lines += _table(offer)
     if not {offer.signal for offer in assignment.offers} & {"tool_number", "nc_block"}:
         lines += ["", "# No tool number and no block text: tool_change_active will be null."]
-    lines += ["", "# Data items without a canonical signal. Add one by a table [signals.<name>] with its data_item:"]
+    if any(item.type == "TOOL_ASSET_ID" for item in device.items):
+        lines += ["", "# Life, length and radius of the tool in the spindle come from its asset."]
+    lines += [
+        "",
+        "# Data items without a canonical signal. Add one by a table [signals.<name>] with its data_item, or name one:",
+        "# [variables]",
+        '# part_width = { address = "id or name, or id[key] of a data set", unit = "mm" }',
+    ]
     lines += [_comment(item) for item in assignment.unmapped] or ["# none"]
     return "\n".join(lines) + "\n"
 

@@ -10,12 +10,14 @@ is under load (> 5 %) for 48 s, the milling spindle S6 for 4 s, and S2 reports n
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
+from edge.chosen import Chosen
 from edge.config import SignalSection
 from edge.controls.mtconnect.model import DataItem, DeviceModel
 from edge.errors import ConfigError
@@ -25,6 +27,7 @@ from edge.signals import signal
 from edge.units import conversion
 
 _SPEEDS = ("ROTARY_VELOCITY", "SPINDLE_SPEED")
+_ADDRESS = re.compile(r"([^\[\]\s]+)(?:\[([^\[\]]+)\])?")
 _AXIS_NAME = re.compile(r"([A-Za-z])(\d{0,2})")
 
 
@@ -35,8 +38,44 @@ class Assignment:
     targets: tuple[Target, ...]
     offers: tuple[Offer, ...]
     unmapped: tuple[DataItem, ...]
+    chosen: tuple["ChosenItem", ...]
     spindle: str
     spindles: tuple[str, ...]
+
+
+class ChosenItem(NamedTuple):
+    """A data item of [variables] or [plc], or one entry of a data set."""
+
+    data_item_id: str
+    key: str
+    target: Target
+
+
+def address_of(chosen: Chosen) -> tuple[str, str]:
+    """The data item and the key of an address: `id`, `name`, or `id[key]` for an entry of a data set.
+
+    >>> address_of(Chosen("variable_width", "Lp1Variable[VC1]"))
+    ('Lp1Variable', 'VC1')
+    """
+    found = _ADDRESS.fullmatch(chosen.address)
+    if found is None:
+        raise ConfigError(f"{chosen.address!r} is no data item; write its id or name, or id[key] for an entry of a data set")
+    return found[1], found[2] or ""
+
+
+def chosen_items(device: DeviceModel, chosen: Iterable[Chosen]) -> Iterator[tuple[ChosenItem, Offer]]:
+    """The items that the configuration reads by address; ConfigError where the device has not got one."""
+    for one in chosen:
+        name, key = address_of(one)
+        item = device.item(name)
+        if item is None or item.category == "CONDITION":
+            raise ConfigError(f"{one.table}.address = {one.address!r}: device {device.name!r} has {_near(device, name)}")
+        yield ChosenItem(item.id, key, one.target(item.id)), one.offer(item.label + (f"[{key}]" if key else ""))
+
+
+def _near(device: DeviceModel, name: str) -> str:
+    near = get_close_matches(name, [i.id for i in device.items] + [i.name for i in device.items if i.name], 3)
+    return "no such item with values" + (f"; near are {', '.join(near)}" if near else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +108,9 @@ def names_and_types() -> tuple[Mapping[str, tuple[str, ...]], tuple[TypeRule, ..
     return names, rules
 
 
-def assign(device: DeviceModel, sections: Mapping[str, SignalSection], spindle: str = "") -> Assignment:
+def assign(
+    device: DeviceModel, sections: Mapping[str, SignalSection], spindle: str = "", by_address: Iterable[Chosen] = ()
+) -> Assignment:
     """Map the items of a device; ConfigError where the configuration names what the device has not."""
     spindles = _spindles(device)
     chosen = _chosen_spindle(device, spindles, spindle)
@@ -88,7 +129,9 @@ def assign(device: DeviceModel, sections: Mapping[str, SignalSection], spindle: 
     targets = tuple(_target(name, item, sections.get(name, SignalSection())) for name, item in found.items())
     offers = tuple(Offer(name, item.label, item.unit, item.low, item.high) for name, item in found.items())
     unmapped = tuple(item for item in device.items if item.id not in taken and item.category != "CONDITION")
-    return Assignment(targets, offers, unmapped, chosen, tuple(spindles))
+    addressed = tuple(chosen_items(device, by_address))
+    offers += tuple(offer for _, offer in addressed)
+    return Assignment(targets, offers, unmapped, tuple(one for one, _ in addressed), chosen, tuple(spindles))
 
 
 Proposal = tuple[str, DataItem]
@@ -100,11 +143,8 @@ def _configured(device: DeviceModel, sections: Mapping[str, SignalSection]) -> I
             continue
         item = device.item(section.data_item)
         if item is None:
-            near = get_close_matches(
-                section.data_item, [i.id for i in device.items] + [i.name for i in device.items if i.name], 3
-            )
-            hint = f"; near are {', '.join(near)}" if near else ""
-            raise ConfigError(f"signals.{name}.data_item = {section.data_item!r}: device {device.name!r} has no such item{hint}")
+            why = _near(device, section.data_item).replace("such item with values", "such item")
+            raise ConfigError(f"signals.{name}.data_item = {section.data_item!r}: device {device.name!r} has {why}")
         yield name, item
 
 

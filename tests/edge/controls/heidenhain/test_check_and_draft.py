@@ -1,5 +1,6 @@
 """`edge check` and `edge discover` on a real server of each model."""
 
+import json
 import socket
 import subprocess
 import sys
@@ -94,3 +95,62 @@ def test_without_pylsv2_the_adapter_is_found_and_one_line_says_what_to_install()
     assert done.stdout.splitlines() == 3 * [
         "the adapter heidenhain needs pyLSV2; install it with: pip install 'cnctwin[heidenhain]'"
     ]
+
+
+def test_check_shows_the_tool_table_and_chosen_addresses_over_the_real_wire() -> None:
+    text = """
+[machine]
+adapter = "heidenhain"
+[heidenhain]
+url = "{url}"
+tool_table = 'TNC:{table}'
+[variables]
+length = {{ address = "/TABLE/TOOL/T/1/L", unit = "mm" }}
+[plc]
+load = {{ address = "W1008", unit = "%", scale = 0.1 }}
+changing = {{ address = "M4000", kind = "flag" }}
+coolant = {{ address = "M4001" }}
+"""
+    shown = {}
+    for model, table in ((Model.TNC640, "\\table\\tool.t"), (Model.ITNC530, "\\TOOL.T")):
+        with Lsv2Server(control(), model=model) as server:
+            config = parse(text.format(url=server.url, table=table), Path("edge.toml"))
+            rows = {row.signal: row for row in describe(config)}
+            assert server.answers.counters.writes_refused == 0
+        assert [rows[name].value for name in ("tool_length_mm", "tool_length_wear_mm", "tool_life_used_min")] == [
+            127.5,
+            -0.01,
+            18.5,
+        ]
+        assert (rows["plc_load"].value, rows["plc_load"].unit, rows["plc_load"].source) == (0.0, "%", "PLC W1008")
+        assert (rows["plc_changing"].value, rows["plc_coolant"].value) == (False, 0.0)
+        assert str(rows["program_comment"].value).startswith("O1701 BASE PLATE")
+        shown[model] = rows["variable_length"]
+    assert (shown[Model.ITNC530].value, shown[Model.ITNC530].source) == (127.5, "R_DP /TABLE/TOOL/T/1/L")
+    assert shown[Model.TNC640].reason == "only the iTNC 530 has data paths; name a PLC address"
+
+
+def test_messages_of_an_itnc_are_a_text_and_a_list() -> None:
+    shows = SimulatedControl(
+        [ControlState(exec_state="STOPPED", program="O1701", line=20, tool_number=1, alarm=(1020, "OVERLOAD"))]
+    )
+    with Lsv2Server(shows, model=Model.ITNC530) as server:
+        rows = {row.signal: row for row in describe(EdgeConfig(source=HeidenhainConfig(url=server.url)))}
+    assert rows["alarm"].value == "1020 OVERLOAD"
+    assert [alarm["code"] for alarm in json.loads(str(rows["alarms"].value))] == ["1020"]
+    assert (rows["tool_length_mm"].value, rows["tool_length_mm"].source) == (100.0, "R_RI 51")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('[variables]\nq = { address = "Q10" }', "variables.q.address: 'Q10' is a Q parameter, which LSV2 does not tell"),
+        ('[plc]\nx = { address = "S1" }', "plc.x.address: 'S1' is a string"),
+        ('[plc]\nx = { address = "W1001" }', "'W1001' lies across two"),
+        ('[heidenhain]\ntool_table = "tool.t"', "heidenhain.tool_table"),
+    ],
+)
+def test_an_address_that_cannot_be_is_refused_before_any_connection(table: str, message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(f'[machine]\nadapter = "heidenhain"\n{table}\n', Path("edge.toml"))
+    assert message in str(caught.value)

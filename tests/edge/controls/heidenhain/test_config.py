@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from edge.config_file import parse
-from edge.controls.heidenhain.config import address_of
+from edge.controls.heidenhain.config import host_and_port
 from edge.controls.heidenhain.control import logins_of, plc_password
 from edge.errors import ConfigError
 
@@ -13,8 +13,8 @@ FILE = '[machine]\nadapter = "heidenhain"\n'
 
 
 def test_addresses() -> None:
-    assert address_of("lsv2://tnc640") == ("tnc640", 19000)
-    assert address_of("lsv2://[::1]:19001") == ("::1", 19001)
+    assert host_and_port("lsv2://tnc640") == ("tnc640", 19000)
+    assert host_and_port("lsv2://[::1]:19001") == ("::1", 19001)
 
 
 @pytest.mark.parametrize(

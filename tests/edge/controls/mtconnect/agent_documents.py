@@ -5,7 +5,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.controls.mtconnect.cursor import Cursor, parse, start
+from edge.controls.mtconnect.cursor import parse, start
+from edge.controls.mtconnect.state import Cursor
 from edge.sample import SampleSet
 
 DIALECTS = ("1.4", "2.3")

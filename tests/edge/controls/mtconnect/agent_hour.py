@@ -24,7 +24,8 @@ from cnctwin.standins.simulated_machine.moment import Adapter, Moment
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection
-from edge.controls.mtconnect.cursor import Config, Phase, parse, start
+from edge.controls.mtconnect.cursor import Config, parse, start
+from edge.controls.mtconnect.state import Phase
 from edge.running.ledger import Ledger
 from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample, Gap

@@ -1,11 +1,14 @@
 """What a client must handle (seen on real agents of both generations), on small hand-made documents."""
 
+import json
+
 import pytest
 from pydantic import TypeAdapter
 
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.controls.mtconnect.cursor import Cursor, Phase, next_request
+from edge.controls.mtconnect.cursor import next_request
+from edge.controls.mtconnect.state import Cursor, Phase
 from edge.sample import Drop
 from sparkplug.quality import Quality
 from tests.edge.controls.mtconnect.agent_documents import CONFIG, DIALECTS, error, fed, probe, streams, value, values
@@ -95,11 +98,22 @@ def test_unavailable_is_null_with_the_reason() -> None:
 def test_conditions_say_their_level_by_the_name_of_their_element() -> None:
     fault = value("servo", 10, "OVERHEAT", element="Fault", nativeCode="430")
     cursor, frame = fed(streams(11, conditions=[fault]), cursor=sampling())
-    assert values(frame) == [("alarm", "FAULT 430 OVERHEAT")]
+    (said, listed) = frame.samples
+    assert (said.signal, said.value, listed.signal) == ("alarm", "FAULT 430 OVERHEAT", "alarms")
+    assert json.loads(str(listed.value)) == [
+        {
+            "code": "430",
+            "text": "OVERHEAT",
+            "severity": "fault",
+            "active": True,
+            "acknowledged": None,
+            "since": "2026-01-01T00:00:10.000Z",
+        }
+    ]
     cursor, frame = fed(streams(12, conditions=[value("servo", 11, element="Normal")]), cursor=cursor)
-    assert values(frame) == [("alarm", "")]
+    assert values(frame) == [("alarm", ""), ("alarms", "[]")]
     cursor, frame = fed(streams(13, conditions=[value("servo", 12, element="Unavailable")]), cursor=cursor)
-    assert [(s.value, s.reason) for s in frame.samples] == [(None, "unavailable")]
+    assert [(s.value, s.reason) for s in frame.samples] == [(None, "unavailable")] * 2
 
 
 @dialects
@@ -202,9 +216,10 @@ def test_an_alarm_that_ended_in_a_hole_is_over() -> None:
     cursor, _ = fed(streams(11, conditions=[fault]), error("OUT_OF_RANGE"), cursor=sampling())
     other = value("servo", 250, "LAG", element="Fault", nativeCode="411")
     cursor, frame = fed(streams(328, conditions=[other], first=200), cursor=cursor)
-    assert values(frame)[-1] == ("alarm", "FAULT 411 LAG")
+    assert values(frame)[-2] == ("alarm", "FAULT 411 LAG")
     cursor, frame = fed(error("OUT_OF_RANGE"), streams(900, conditions=[other], first=800), cursor=cursor)
-    assert values(frame) == [("alarm", "FAULT 411 LAG")]
+    assert values(frame)[0] == ("alarm", "FAULT 411 LAG")
+    assert [alarm["code"] for alarm in json.loads(str(values(frame)[1][1]))] == ["411"]
 
 
 def test_numbers_that_went_back_without_a_new_instance_are_a_hole_and_all_is_taken_anew() -> None:
