@@ -1,7 +1,8 @@
 """The frames of an OPC UA server as samples: deliveries of a subscription in the order of their own time stamps.
 
 The connection names each value by the signal that it stands for (`edge.controls.opcua.point`), or `tool:<n>:<field>` where the
-tool in the spindle has to be found from where each tool is. Everything else happens here: words, units, plausibility.
+tool in the spindle has to be found from where each tool is; events keep their own keys (`edge.controls.opcua.event`). Everything
+else happens here: words, units, plausibility.
 """
 
 import re
@@ -107,7 +108,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
     gave_up = after.heard.is_authority and not spoken.heard.is_authority
     after = replace(after, heard=spoken.heard)
     both = _Both(found, _published(config, spoken.samples, of_all))
-    after, samples = _one_alarm(config, after, sweep, told=both, dropped=of_all, gave_up=gave_up)
+    after, samples = _one_alarm(config, after, sweep, both=both, dropped=of_all, gave_up=gave_up)
     if not taken.is_baseline:
         samples = tuple(sorted(samples, key=lambda sample: sample.timestamp_ms))
     offers = _offers(config, after) if is_new or _offered(after) != _offered(before) else None
@@ -127,7 +128,7 @@ def _published(config: Config, events: tuple[EdgeSample, ...], dropped: Counter[
 
 
 def _one_alarm(
-    config: Config, cursor: Cursor, sweep: Sweep, *, told: _Both, dropped: Counter[str], gave_up: bool
+    config: Config, cursor: Cursor, sweep: Sweep, *, both: _Both, dropped: Counter[str], gave_up: bool
 ) -> tuple[Cursor, tuple[EdgeSample, ...]]:
     """Let one source tell the signal `alarm`: the events where they tell all alarms, else the variable where the map has one.
 
@@ -137,13 +138,13 @@ def _one_alarm(
     after = replace(cursor, alarm_variable=newest or cursor.alarm_variable)
     variable = _alarm_variable(config, after)
     if variable is None:
-        superseded = tuple(sample for sample in told.values if sample.signal == ALARM)
+        superseded = tuple(sample for sample in both.values if sample.signal == ALARM)
         dropped[Drop.EVIDENCE] += observations_of(superseded)
-        return after, (*(sample for sample in told.values if sample not in superseded), *told.events)
-    shown = tuple(sample for sample in told.events if sample.signal != ALARM)
+        return after, (*(sample for sample in both.values if sample not in superseded), *both.events)
+    shown = tuple(sample for sample in both.events if sample.signal != ALARM)
     kept = cursor.alarm_variable if gave_up and newest is None else None
     again = () if kept is None else (replace(_sample(variable, kept, sweep), observations=0),)
-    return after, (*told.values, *again, *shown)
+    return after, (*both.values, *again, *shown)
 
 
 def _alarm_variable(config: Config, cursor: Cursor) -> Meaning | None:
