@@ -26,6 +26,7 @@ class ToolReader:
         self._points = [point for point in points_of(config) if point.follows_tool]
         self._client, self._namespaces, self._clock = client, namespaces, clock
         self._tool: int | None = None
+        self._tool_ms: int | None = None  # when the control says that it came or went
         self._is_due, self._read_s = bool(self._points), clock()
 
     def heard(self, facts: Iterable[Fact]) -> None:
@@ -34,7 +35,7 @@ class ToolReader:
             if fact.key == TOOL_NUMBER:
                 tool = _number(fact)
                 self._is_due |= tool != self._tool
-                self._tool = tool
+                self._tool, self._tool_ms = tool, fact.t_ms
 
     async def tick(self) -> list[Fact]:
         """Return the values of the tool in the spindle where they are due, else nothing."""
@@ -46,14 +47,19 @@ class ToolReader:
     async def _read(self) -> list[Fact]:
         if not self._tool:
             fault = NOT_KNOWN if self._tool is None else NO_TOOL
-            return [Fact(point.signal, fault=fault) for point in self._points]
+            return [Fact(point.signal, fault=fault, t_ms=self._tool_ms) for point in self._points]
         nodes = [node_id(node_of(point.node_for(self._tool)), self._namespaces) for point in self._points]
         there = [(point, node) for point, node in zip(self._points, nodes, strict=True) if node is not None]
         values = await session.read_values(self._client, [node for _, node in there])
-        return [
+        facts = [
             plain.as_fact(point.signal, value, element=point.element, stamps="server")  # the moment of the read, not of the entry
             for (point, _), value in zip(there, values, strict=True)
         ]
+        return [fact._replace(t_ms=self._not_before(fact.t_ms)) for fact in facts]
+
+    def _not_before(self, at_ms: int | None) -> int | None:
+        """Return this stamp, or that of the tool where a server stamps what it reads by when it was entered."""
+        return self._tool_ms if at_ms is None or self._tool_ms is None else max(at_ms, self._tool_ms)
 
 
 def _number(fact: Fact) -> int | None:

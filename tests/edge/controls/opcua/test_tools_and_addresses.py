@@ -19,7 +19,7 @@ from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.tool_life import LifeEntry, life_fact
 from edge.errors import ConfigError
 from edge.sweep import Fact, Sweep
-from tests.edge.controls.opcua.conftest import Bench
+from tests.edge.controls.opcua.conftest import NOW_S, Bench
 from tests.edge.controls.opcua.test_connection import reading
 
 
@@ -36,8 +36,11 @@ def test_geometry_wear_and_life_are_those_of_the_tool_in_the_spindle_and_follow_
         bench.show(ControlState(tool_number=0, part_count=30))
         gone = reader.until(lambda one: any(s.signal == "tool_length_mm" for s in one.samples))
         assert {s.reason for s in gone.samples if s.signal.startswith("tool_l")} == {tool_reader.NO_TOOL}
+        changed_ms = round((NOW_S + bench.machine_s) * 1000)
+        assert {s.timestamp_ms for s in gone.samples if s.signal.startswith("tool_l")} == {changed_ms}, "in the control's time"
         bench.show(ControlState(tool_number=5, part_count=30))
         fifth = reader.until(lambda one: any(s.signal == "tool_length_mm" and s.value == 150.0 for s in one.samples))
+        assert all(s.timestamp_ms > changed_ms for s in fifth.samples if s.signal.startswith("tool_l"))
         life = {s.signal: s.reason for s in fifth.samples if s.signal.startswith("tool_life")}
         assert life["tool_life_limit_min"] == "empty", "its life is not monitored"
         assert life["tool_life_used_min"] == "the control tells what is left, 0, and no limit"
