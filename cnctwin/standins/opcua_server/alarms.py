@@ -94,9 +94,9 @@ class Alarms:
         """Send a message that nothing lasts of."""
         await self._send(await self._event(self._types["CncMessageType"], text))
 
-    async def require_refresh(self) -> None:
-        """Say that what was told of alarms may be wrong by now."""
-        await self._send(await self._standard(ObjectIds.RefreshRequiredEventType))
+    async def warn(self, kind: int) -> None:
+        """Send an event of the server itself, by the number of its type: that a refresh is required, that a queue ran over."""
+        await self._send(await self._standard(kind))
 
     async def _refresh(self, _parent: Any, subscription: int) -> None:
         for event in (

@@ -270,7 +270,12 @@ class OpcUaServer:
     def require_refresh(self) -> None:
         """Tell clients to ask for the alarms once more."""
         assert self._alarms is not None
-        self._in_loop(self._alarms.require_refresh())
+        self._in_loop(self._alarms.warn(ObjectIds.RefreshRequiredEventType))
+
+    def lose_events(self) -> None:
+        """Tell clients that the queue of their events ran over."""
+        assert self._alarms is not None
+        self._in_loop(self._alarms.warn(ObjectIds.EventQueueOverflowEventType))
 
     def set_state(self, state: str) -> None:
         """The server's own state, as Running or CommunicationFault."""

@@ -66,8 +66,8 @@ def told(heard: Heard, facts: Iterable[Fact], frame_ms: int, number: int) -> Tol
 
 def _one(heard: Heard, fact: Fact, own_ms: int, at_ms: int) -> tuple[Heard, tuple[EdgeSample, ...], Drop | None]:
     table = heard.table
-    if fact.key == EVENTS and not fact.fault:
-        return Heard(str(fact.value), AlarmTable(Phase.ASKED, table.alarms)), (), Drop.EVIDENCE
+    if fact.key == EVENTS and isinstance(fact.value, str) and fact.value:
+        return Heard(fact.value, AlarmTable(Phase.ASKED, table.alarms)), (), Drop.EVIDENCE
     if fact.key in (EVENTS, REFRESH):
         is_refused = fact.key == EVENTS
         phase, kept = (Phase.NONE, ()) if is_refused else (Phase.PARTIAL, table.alarms)

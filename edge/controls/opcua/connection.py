@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from edge.controls.opcua.config import Config, points_of
 from edge.controls.opcua.cursor import Cursor
 from edge.controls.opcua.delivery import Delivery, Load, Notification
+from edge.controls.opcua.event import EVENT, EVENTS, Event, Kind
 from edge.controls.opcua.library import require
 from edge.controls.opcua.spindle_tool import index_in_spindle
 from edge.errors import ConnectionLostError, EdgeError
@@ -281,8 +282,9 @@ class OpcUaConnection:
         if self._tools is not None:
             self._tools.heard(facts)
         self._compare([plain.stamps_apart_ms(value) for _, value in known])
-        overflowed = tuple(key for key, value in known if plain.overflowed(value))
-        self._heard(Notification(int(result.NotificationMessage.SequenceNumber), tuple(facts), overflowed, not parts))
+        overflowed = [key for key, value in known if plain.overflowed(value)]
+        overflowed += [EVENTS for fact in facts if fact.key == EVENT and Event.kind_of(fact) is Kind.OVERFLOW]
+        self._heard(Notification(int(result.NotificationMessage.SequenceNumber), tuple(facts), tuple(overflowed), not parts))
 
     async def _ask(self) -> None:
         """Have the alarms repeated, and read what belongs to the tool in the spindle, where that is due."""

@@ -54,6 +54,7 @@ class Meaning:
 class Cursor:
     """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
 
+    tool_ms: since when it is that one
     heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
     limits: the last values of signals from which others count down; life: signals of a tool's life that were published
     """
@@ -63,6 +64,7 @@ class Cursor:
     unmapped: tuple[str, ...] = ()
     tools: Tools = ()
     tool: str = "?"
+    tool_ms: int = 0
     heard: Heard = field(default_factory=Heard)
     alarm_variable: Fact | None = None
     limits: Limits = ()
@@ -232,7 +234,8 @@ def _samples(
             samples += [] if sample is None else [sample]
         for fact in moment:
             if fact.key == TOOL_LIFE:
-                found = life_samples(fact, cursor.life, sweep.t_ms if fact.t_ms is None else fact.t_ms)
+                stamp_ms = max(fact.t_ms or cursor.tool_ms or sweep.t_ms, cursor.tool_ms)  # not before the tool came
+                found = life_samples(fact, cursor.life, stamp_ms)
                 found = tuple(sample for sample in found if is_published(config, sample.signal))
                 cursor = replace(cursor, life=tuple(sorted({*cursor.life, *(sample.signal for sample in found)})))
                 dropped[Drop.UNMAPPED] += 1 - observations_of(found)
@@ -282,6 +285,7 @@ def _tool(config: Config, cursor: Cursor, placed: Iterable[Fact], sweep: Sweep) 
     after = replace(cursor, tools=tools, tool=shown)
     if shown == cursor.tool:
         return after, None
+    after = replace(after, tool_ms=at_ms)
     if not is_known:
         why = f"no one tool is at the place {config.source.spindle_place!r}"
         return after, EdgeSample("tool_number", None, at_ms, Quality.BAD, why, sweep.number)

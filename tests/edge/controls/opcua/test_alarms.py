@@ -78,6 +78,18 @@ def test_a_server_that_wants_a_refresh_is_asked_for_one(bench: Bench, monkeypatc
         assert again.samples[-1].is_baseline
 
 
+def test_events_that_the_server_lost_are_a_stated_hole_and_the_alarms_are_asked_for_again(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("edge.controls.opcua.event_session.REFRESH_APART_S_MIN", 0.1)
+    with reading(bench.config()) as reader:
+        until_alarms(reader)
+        bench.server.lose_events()
+        lost = reader.until(lambda one: bool(one.gaps))
+        assert [gap.reason for gap in lost.gaps] == ["queue of the server ran over: events"]
+        until_alarms(reader)
+
+
 def test_a_message_of_the_program_comes_as_an_event(bench: Bench) -> None:
     with reading(bench.config()) as reader:
         until_alarms(reader)
