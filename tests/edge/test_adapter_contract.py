@@ -19,8 +19,10 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from edge.adapter import Adapter, adapters, modules
+from edge.chosen import Chosen
 from edge.config import EdgeConfig, MachineSection
 from edge.config_file import load
+from edge.errors import ConfigError
 from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from edge.section import Section
@@ -89,6 +91,14 @@ def test_its_sample_and_the_shared_one_name_every_key_once(adapter: Adapter) -> 
     tables = tomllib.loads(own) | of_all
     for name, section in (keys | shared).items():
         assert tables[name].keys() == type(section).model_fields.keys()
+
+
+@every_adapter
+@pytest.mark.parametrize("is_plc", [False, True])
+def test_an_address_that_is_none_is_refused_in_one_line(adapter: Adapter, is_plc: bool) -> None:
+    with pytest.raises(ConfigError) as caught:
+        adapter.address(Chosen("plc_x" if is_plc else "variable_x", "no place [ at all", is_plc=is_plc))
+    assert "\n" not in str(caught.value)
 
 
 @every_adapter

@@ -98,9 +98,13 @@ _TABLE = (
     Signal("tool_life_used_count", Kind.INTEGER, "uses of the tool in the spindle, as the control counts them"),
     Signal("tool_life_limit_count", Kind.INTEGER, "number of uses at which the control calls that tool worn"),
     _number(
-        "tool_length_mm", "mm", -10_000, 10_000, "length of the tool in the spindle, from the control's own table, without wear"
+        "tool_length_mm",
+        "mm",
+        -10_000,
+        10_000,
+        "length of the tool in the spindle, by the control's own offset in force, without wear",
     ),
-    _number("tool_radius_mm", "mm", -1_000, 1_000, "radius of that tool, without wear"),
+    _number("tool_radius_mm", "mm", -1_000, 1_000, "radius of that tool, likewise"),
     _number("tool_length_wear_mm", "mm", -1_000, 1_000, "wear offset of the length of that tool"),
     _number("tool_radius_wear_mm", "mm", -1_000, 1_000, "wear offset of the radius of that tool"),
     _number("clock_offset_s", "s", -1e12, 1e12, "clock of the control minus clock of the edge"),

@@ -170,12 +170,17 @@ class FocasConnection:
     def _turned_to(self, found: Sequence[FocasValue]) -> tuple[Fact, ...]:
         """Plan what is rare, where it is due or the tool or program is another now; return what is known without asking."""
         assert self._identity is not None
-        subject = Subject.after(self._subject, found)
-        if subject == self._subject and not self._is_due(self._rare_s, self._config.rare_interval_s):
-            return ()
-        self._subject, self._rare_s = subject, self._clock()
+        before, subject = self._subject, Subject.after(self._subject, found)
         is_lathe = self._identity.mt_type.strip().startswith("T")
-        self._rare = rare(self._config, subject, is_lathe)
+        if self._is_due(self._rare_s, self._config.rare_interval_s):
+            self._rare_s, self._rare = self._clock(), rare(self._config, subject, is_lathe)
+        elif subject != before:
+            wanted, asked = rare(self._config, subject, is_lathe), rare(self._config, before, is_lathe)
+            of_the_tool = {Request(Call.LIFE)} if subject.tool != before.tool else set()
+            self._rare = tuple(one for one in wanted if one in self._rare or one not in asked or one in of_the_tool)
+        else:
+            return ()
+        self._subject = subject
         return without_offset(self._config, subject, is_lathe)
 
     def _is_due(self, last_s: float, interval_s: float) -> bool:

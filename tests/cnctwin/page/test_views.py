@@ -1,5 +1,6 @@
 """What a person sees on the page, in a real browser, of a made-up shop."""
 
+import json
 import re
 import time
 
@@ -96,6 +97,20 @@ def test_the_last_minutes_are_there_before_they_were_looked_at(visit: Visit) -> 
     while not visit.evaluate(f"{script} return ring && ring.last - ring.first > 280_000;"):
         assert time.monotonic() < deadline_s
         visit.page.wait_for_timeout(100)
+
+
+def test_the_controls_own_count_stands_beside_the_parts_left_of_the_tool_in_the_spindle(visit: Visit, shop: Shop) -> None:
+    lives = [{"tool": 5, "parts": 120, "parts_left": 40.0, "parts_left_band": [30.0, 55.0]}, {"tool": 3, "parts": 80}]
+    told = {"twin/tool_lives": SignalValue(json.dumps(lives)), "tool_number": SignalValue(5)}
+    shop.other["vmc"] = told | {"tool_life_used_min": SignalValue(18.5), "tool_life_limit_min": SignalValue(60.0)}
+    page = visit.open("#/machine/vmc")
+    page.locator("details.tools summary").click()
+    rows = page.locator("details.tools tbody tr")
+    expect(rows.nth(0).locator("td").nth(5)).to_have_text("18.5 of 60 min")
+    expect(rows.nth(1).locator("td").nth(5)).to_have_text("–")
+    no_minutes = {name: SignalValue(None, "min") for name in ("tool_life_used_min", "tool_life_limit_min")}
+    shop.other["vmc"] = told | no_minutes | {"tool_life_used_count": SignalValue(37)}
+    expect(rows.nth(0).locator("td").nth(5)).to_have_text("37 uses")
 
 
 def test_a_null_shows_its_reason(visit: Visit, shop: Shop) -> None:

@@ -171,14 +171,16 @@ def test_the_first_look_asks_all_that_is_rare_and_later_ones_a_few_at_a_time() -
     kinds = {"offset.length", "offset.length_wear", "offset.radius", "offset.radius_wear"}
     assert kinds | {"program.comment"} <= facts(first).keys()
     control.shows["modal.H"] = 8
-    control.looks(5)
-    asked = [
-        [name for name in names if name.startswith(("cnc_rdtofs", "cnc_rdprogdir3"))] for names in control.asked[4:]
-    ]  # from the look after the one that shows it
+    control.looks(2)
+    control.shows |= {"modal.H": 9, "modal.D": 29, "program.number": 1702}
+    control.looks(4)
+    rare = ("cnc_rdtofs", "cnc_rdprogdir3")
+    asked = [[name for name in names if name.startswith(rare)] for names in control.asked[4:]]  # after the look that shows H 8
     assert asked == [
-        ["cnc_rdtofs radius_wear 27", "cnc_rdtofs radius 27", "cnc_rdtofs length_wear 8", "cnc_rdtofs length 8"],
-        ["cnc_rdprogdir3 1701"],
+        ["cnc_rdtofs length_wear 8", "cnc_rdtofs length 8"],  # only what has changed
         [],
+        ["cnc_rdtofs radius_wear 29", "cnc_rdtofs radius 29", "cnc_rdtofs length_wear 9", "cnc_rdtofs length 9"],
+        ["cnc_rdprogdir3 1702"],
         [],
     ]
 

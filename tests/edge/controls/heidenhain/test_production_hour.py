@@ -76,7 +76,9 @@ def _is_true(run: Run, look: Look, sample: EdgeSample) -> bool:
         return any(round(state.spindle_rpm) == value for state in shown)
     if name == "spindle_load_pct":
         return any(round(state.spindle_load_pct * 10) == value for state in shown)
-    return name == "alarm" and value == ""
+    if name == "program_comment":
+        return run.blocks[1] == f"; {value}"
+    return {"alarm": "", "alarms": "[]", "tool_length_mm": 100.0, "tool_radius_mm": 6.0}.get(name) == value
 
 
 def test_every_value_that_was_published_was_really_shown_at_that_time(run: Run) -> None:
