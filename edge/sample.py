@@ -25,8 +25,8 @@ class Drop(StrEnum):
     DUPLICATE = "duplicate"  # it was taken before, by its sequence number
     DEBOUNCED = "debounced"  # a flap of the tool number that is no change
     OTHER_DEVICE = "other_device"  # it belongs to another device of the same agent
-    EVIDENCE = "evidence"  # it says whether a tool change is in progress, and is no signal of its own
-    UNPARSABLE = "unparsable"  # it has no sequence number or no time
+    EVIDENCE = "evidence"  # it belongs to another signal (a tool change, a list of alarms), and is none of its own
+    UNPARSABLE = "unparsable"  # it has no sequence number, no time, or is not what it should be
     CONTROL_LOST = "control_lost"  # the device is dead because the control reports nothing; this was one of its nulls
     STORE_AGE = "store_age"  # it waited for a broker longer than the store keeps it
     STORE_BYTES = "store_bytes"  # the store was full

@@ -7,7 +7,7 @@ from asyncua import ua
 from asyncua.common.node import Node
 from asyncua.server.server import Server
 
-from cnctwin.standins.opcua_server.shown import Shown, Value
+from cnctwin.standins.opcua_server.shown import SINUMERIK_OBJECT, Shown, Value
 
 
 async def build(server: Server, shown: Iterable[Shown], calls: Any) -> dict[Shown, ua.NodeId]:
@@ -27,6 +27,7 @@ async def build(server: Server, shown: Iterable[Shown], calls: Any) -> dict[Show
                 objects[place] = await _object(server, parent, index, step, types)
             parent = objects[place]
         nodes[one] = await _variable(parent, index, one)
+        objects[one.model, *one.path] = server.get_node(nodes[one])  # a variable may have properties of its own
     if indices:
         index = min(indices.values())
         await server.nodes.objects.add_method(ua.NodeId(ua.String("/Methods/Reset"), ua.Int16(index)), "Reset", calls, [], [])
@@ -36,6 +37,8 @@ async def build(server: Server, shown: Iterable[Shown], calls: Any) -> dict[Show
 async def _object(server: Server, parent: Node, index: int, step: str, types: dict[str, Node]) -> Node:
     """An object; its type, where it has one, may be derived from another: `Channel1:VendorChannelType:CncChannelType`."""
     name, *kinds = [part for part in step.split(":") if part]
+    if name == SINUMERIK_OBJECT:  # its node has a name, since clients subscribe to its events
+        return await parent.add_object(ua.NodeId(ua.String(name), ua.Int16(index)), ua.QualifiedName(name, ua.UInt16(index)))
     if not kinds:
         return await parent.add_object(index, name)
     base, vendor = server.nodes.base_object_type, 1  # index 1 is the server's own namespace

@@ -27,7 +27,8 @@ def simulate_opcua(
     """Serve until stopped; says where, and what to pin. `is_open`: also without security, for those who ask for that."""
     if importlib.util.find_spec("asyncua") is None:
         raise ApplicationError("an OPC UA server needs the library asyncua; install it with: pip install 'cnctwin[opcua]'")
-    from cnctwin.standins.opcua_server.server import OpcUaServer  # noqa: PLC0415  asyncua is an extra
+    from cnctwin.standins.opcua_server.alarms import alarms_of  # noqa: PLC0415  asyncua is an extra
+    from cnctwin.standins.opcua_server.server import OpcUaServer  # noqa: PLC0415
 
     logging.getLogger("asyncua.server.server").setLevel(logging.CRITICAL)  # why it can't start is told below, without a traceback
     control = SimulatedControl(production(DAY_S), speed=speed, clock_offset_s=clock_offset_s)
@@ -35,6 +36,7 @@ def simulate_opcua(
         discover = f"cnctwin edge discover '{server.url}?server_fingerprint={server.fingerprint}'"
         print(f"{server.url} serves a simulated control; Ctrl-C ends it\nto draft a configuration: {discover}", flush=True)
         while not stop.wait(STATE_S) and server.error is None:
+            server.set_alarms(*alarms_of(control.now()))
             keep(state_file, {"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes})
         if server.error is not None:
             raise ApplicationError(f"the OPC UA server broke down: {server.error}") from server.error

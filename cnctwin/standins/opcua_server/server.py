@@ -27,7 +27,8 @@ from asyncua.ua.status_codes import StatusCodes
 from cnctwin.errors import ApplicationError
 from cnctwin.processes.port import free_port
 from cnctwin.standins.opcua_server.address_space import build, variant
-from cnctwin.standins.opcua_server.shown import MODELS, Shown, Value, shown
+from cnctwin.standins.opcua_server.alarms import Alarms, ShownAlarm
+from cnctwin.standins.opcua_server.shown import MODELS, SINUMERIK, SINUMERIK_OBJECT, Shown, Value, shown
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from edge.controls.opcua.certificates import fingerprint, own_identity
 
@@ -93,6 +94,8 @@ class OpcUaServer:
         wanted = {MODELS[name] for name in models}
         self._shown = tuple(one for one in shown() if one.model in wanted and one.path[-1] not in missing)
         self._stepped = stepped
+        self._alarms: Alarms | None = None
+        self._more_alarms: tuple[ShownAlarm, ...] = ()
         self._nodes: dict[Shown, ua.NodeId] = {}
         self._last: dict[Shown, Value] = {}
         self._statuses: dict[str, int] = {}
@@ -156,6 +159,7 @@ class OpcUaServer:
             await server.load_private_key(self._identity.key, format="pem")
         server.disable_clock()
         self._nodes = await build(server, self._shown, self._called)
+        self._alarms = await self._conditions(server)
         server.subscribe_server_callback(CallbackType.PreWrite, self._written)
         self._last.clear()
         self._server, self._loop = server, asyncio.get_running_loop()
@@ -172,6 +176,15 @@ class OpcUaServer:
         finally:
             self._server = None
             await server.stop()
+
+    async def _conditions(self, server: Server) -> Alarms:
+        notifiers = [server.nodes.server]
+        if any(one.model == SINUMERIK for one in self._shown):
+            index = await server.get_namespace_index(SINUMERIK)
+            notifiers.append(server.get_node(ua.NodeId(ua.String(SINUMERIK_OBJECT), ua.Int16(index))))
+        alarms = Alarms(server, notifiers, lambda: _stamp(self.control))
+        await alarms.prepare()
+        return alarms
 
     def _written(self, event: Any, _service: Any) -> None:
         self.writes += 1 if event.is_external else 0
@@ -202,6 +215,9 @@ class OpcUaServer:
             if self._last.get(one) != value:
                 self._last[one] = value
                 await self._write(node, ua.DataValue(variant(one, value), ua.StatusCode(), now, now))
+        if self._alarms is not None:
+            stopping = () if state.alarm is None else (ShownAlarm(str(state.alarm[0]), state.alarm[1]),)
+            await self._alarms.show((*stopping, *self._more_alarms))
         server = self._server
         assert server is not None
         await self._write(
@@ -241,6 +257,26 @@ class OpcUaServer:
         gone = ua.StatusCode(ua.UInt32(StatusCodes.BadConfigurationError))
         await server.write_attribute_value(node, ua.DataValue(ua.Variant(None), gone, _stamp(self.control)))
 
+    def set_alarms(self, *alarms: ShownAlarm) -> None:
+        """Show these alarms beside that of the control."""
+        self._more_alarms = alarms
+        self.look()
+
+    def say(self, text: str) -> None:
+        """Send a message to the operator, as an event."""
+        assert self._alarms is not None
+        self._in_loop(self._alarms.say(text))
+
+    def require_refresh(self) -> None:
+        """Tell clients to ask for the alarms once more."""
+        assert self._alarms is not None
+        self._in_loop(self._alarms.warn(ObjectIds.RefreshRequiredEventType))
+
+    def lose_events(self) -> None:
+        """Tell clients that the queue of their events ran over."""
+        assert self._alarms is not None
+        self._in_loop(self._alarms.warn(ObjectIds.EventQueueOverflowEventType))
+
     def set_state(self, state: str) -> None:
         """The server's own state, as Running or CommunicationFault."""
         value = ua.Variant(ua.ServerState[state].value, ua.VariantType.Int32)
@@ -248,7 +284,8 @@ class OpcUaServer:
         self._in_loop(self._write(node, ua.DataValue(value)))
 
     def clear(self) -> None:
-        """All variables as the control shows them."""
+        """All variables as the control shows them, and no alarm but its own."""
+        self._more_alarms = ()
         names = set(self._statuses)
         self._statuses.clear()
         for one in list(self._last):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from cnctwin.standins.simulated_control.state import AXES, ControlState
 
-SINUMERIK = "SinumerikVarProvider"
+SINUMERIK, SINUMERIK_OBJECT = "SinumerikVarProvider", "Sinumerik"
 CNC = "http://opcfoundation.org/UA/CNC"
 MACHINE_TOOL = "http://opcfoundation.org/UA/MachineTool/"
 MODELS = {"sinumerik": SINUMERIK, "cnc_40502": CNC, "machinetool_40501": MACHINE_TOOL}
@@ -66,6 +66,31 @@ def _sinumerik() -> tuple[Shown, ...]:
         one("/Channel/MachineAxis/actToolBasePos[u1,2]", "Double", lambda s: s.axis_pos_mm[1]),
         one("/Channel/MachineAxis/actToolBasePos[u1,3]", "Double", lambda s: s.axis_pos_mm[2]),
         one("/Nck/TopPrioAlarm/alarmNo", "Int32", lambda s: 0 if s.alarm is None else s.alarm[0]),
+        one("/Channel/ProgramInfo/msg", "String", lambda s: f"PART {s.part_count + 1}" if s.exec_state == "ACTIVE" else ""),
+        one("/Channel/Parameter/R[u1,10]", "Double", lambda s: float(s.part_count)),
+        one("/Plc/DB100.DBW2", "UInt32", lambda s: 45 if s.coolant_on else 3),  # coolant pressure in tenths of a bar
+        one("/Plc/M5.0", "Boolean", lambda s: s.coolant_on),
+        *(line for tool in TOOLS for line in _tool_tables(tool)),
+    )
+
+
+def _tool_tables(tool: int) -> tuple[Shown, ...]:
+    """The column of one tool: geometry and wear, and what is left of its life where that is monitored."""
+
+    def one(table: str, line: int, value: Callable[[ControlState], Value]) -> Shown:
+        identifier = f"/Tool/{table}[u1,c{tool},{line}]"
+        return Shown(SINUMERIK, ("Sinumerik:", *identifier.strip("/").split("/")), "Double", value, identifier)
+
+    life_min, life_count = (60.0, 200.0) if tool != 5 else (0.0, 0.0)
+    return (
+        one("Compensation/edgeData", 3, lambda s: 100.0 + 10 * tool),
+        one("Compensation/edgeData", 6, lambda s: 2.0 * tool),
+        one("Compensation/edgeData", 12, lambda s: -0.01 * tool),
+        one("Compensation/edgeData", 15, lambda s: -0.002 * tool),
+        one("Supervision/data", 2, lambda s: life_min - round(s.at_s / 600, 1) % 60 if life_min else 0.0),
+        one("Supervision/data", 4, lambda s: life_count - s.part_count % 200 if life_count else 0.0),
+        one("Supervision/data", 5, lambda s: life_min),
+        one("Supervision/data", 6, lambda s: life_count),
     )
 
 
@@ -103,6 +128,28 @@ def _cnc() -> tuple[Shown, ...]:
     )
 
 
+def _tool_life(tool_path: tuple[str, ...], tool: int) -> tuple[Shown, ...]:
+    """The life of one tool: of odd ones in hours that are left, of even ones in parts that were made."""
+
+    def one(name: str, kind: str, value: Callable[[ControlState], Value], unit: str = "") -> Shown:
+        return Shown(MACHINE_TOOL, (*tool_path, "ToolLife", *name.split("/")), kind, value, unit=unit)
+
+    if tool % 2:
+        return (
+            one("Time", "Double", lambda s: 1.0 - s.part_count / 100 % 1.0, "h"),
+            one("Time/Indication", "Int32", lambda s: 0),
+            one("Time/IsCountingUp", "Boolean", lambda s: False),
+            one("Time/StartValue", "Double", lambda s: 1.0),
+            one("Time/LimitValue", "Double", lambda s: 0.0),
+        )
+    return (
+        one("Parts", "UInt32", lambda s: s.part_count % 200),
+        one("Parts/Indication", "Int32", lambda s: 1),
+        one("Parts/IsCountingUp", "Boolean", lambda s: True),
+        one("Parts/LimitValue", "UInt32", lambda s: 200),
+    )
+
+
 def _machine_tool() -> tuple[Shown, ...]:
     root = ("Machines:", "Mill:MachineToolType")
     channel = (*root, "Monitoring:MonitoringType", "Channel1:ChannelMonitoringType")
@@ -120,6 +167,7 @@ def _machine_tool() -> tuple[Shown, ...]:
             one(where, "ControlIdentifier1", "UInt32", lambda s, t=tool: t),  # type: ignore[misc]
             one(where, "Location/Name", "String", lambda s, t=tool: "Spindle" if s.tool_number == t else "Magazine"),  # type: ignore[misc]
             one(where, "Location/PlaceNumber", "UInt16", lambda s, t=tool: 99 if s.tool_number == t else t),  # type: ignore[misc]
+            *_tool_life(where, tool),
         )
     )
     return (

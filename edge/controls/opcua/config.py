@@ -6,11 +6,13 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from edge.config import EdgeConfig
-from edge.controls.opcua.point import TOOL, Point, maps
+from edge.controls.opcua.address import node_of_address
+from edge.controls.opcua.point import TOOL, Point, maps, node_of
 from edge.errors import ConfigError
 from edge.section import Section
 
-SECURITY = ("auto", "none")
+AUTO, NONE = "auto", "none"
+SECURITY = (AUTO, NONE)
 POLICIES = ("Aes256Sha256RsaPss", "Aes128Sha256RsaOaep", "Basic256Sha256")  # best first; older ones are not offered: SHA-1
 MODES = ("SignAndEncrypt", "Sign")
 
@@ -43,6 +45,15 @@ def _map(name: str) -> str:
     return name
 
 
+def _events(text: str) -> str:
+    if text not in (AUTO, NONE):
+        try:
+            node_of(text)
+        except ConfigError as error:
+            raise ValueError(f"is neither auto nor none, and {error}") from error
+    return text
+
+
 class OpcUaConfig(Section):
     """The server, how it is trusted, and how it is asked. `map` is a file of edge/controls/opcua/maps, without its ending."""
 
@@ -51,7 +62,8 @@ class OpcUaConfig(Section):
     channel: str = ""
     spindle: str = ""
     spindle_place: str = "spindle"
-    security: Annotated[str, AfterValidator(_security)] = "auto"
+    events: Annotated[str, AfterValidator(_events)] = AUTO
+    security: Annotated[str, AfterValidator(_security)] = AUTO
     server_fingerprint: Annotated[str, AfterValidator(_fingerprint)] = ""
     certificate_folder: str = ""
     username: str = ""
@@ -79,7 +91,10 @@ Config = EdgeConfig[OpcUaConfig]
 
 
 def points_of(config: Config) -> tuple[Point, ...]:
-    """Return what is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds."""
+    """Return what is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds.
+
+    What [variables] and [plc] choose comes last.
+    """
     ready = maps()[config.source.map].points if config.source.map else ()
     known = {point.signal: point for point in ready}
     own: dict[str, Point] = {}
@@ -90,10 +105,13 @@ def points_of(config: Config) -> tuple[Point, ...]:
                 own[name] = Point(signal=name, node=section.data_item, words=words, seen="the configuration")
             except ConfigError as error:
                 raise ConfigError(f"{config.path}: signals.{name}.data_item: {error}") from error
+    for one in config.chosen:
+        own[one.signal] = Point(signal=one.signal, node=node_of_address(one), seen="the configuration")
     kept = [point for point in ready if point.signal not in own and not (point.signal == TOOL and "tool_number" in own)]
-    return tuple(point for point in (*kept, *own.values()) if _is_published(config, point.signal))
+    return tuple(point for point in (*kept, *own.values()) if is_published(config, point.signal))
 
 
-def _is_published(config: Config, signal: str) -> bool:
+def is_published(config: Config, signal: str) -> bool:
+    """Return False for a signal that the configuration keeps back."""
     section = config.signals.get("tool_number" if signal == TOOL else signal)
     return section is None or section.publish

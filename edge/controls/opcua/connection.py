@@ -13,14 +13,16 @@ import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from edge.controls.opcua.config import Config, points_of
 from edge.controls.opcua.cursor import Cursor
 from edge.controls.opcua.delivery import Delivery, Load, Notification
+from edge.controls.opcua.event import EVENT, EVENTS, Event, Kind
 from edge.controls.opcua.library import require
+from edge.controls.opcua.spindle_tool import index_in_spindle
 from edge.errors import ConnectionLostError, EdgeError
 from edge.sample import ClockReading
 from edge.sweep import Fact, Hole, Sweep
@@ -29,8 +31,11 @@ if TYPE_CHECKING:
     from asyncua import ua
     from asyncua.client.client import Client
 
+    from edge.controls.opcua.event_session import EventWatch
+    from edge.controls.opcua.life_reader import LifeReader
     from edge.controls.opcua.resolve import Resolved
     from edge.controls.opcua.session import ServerStatus, Watched
+    from edge.controls.opcua.tool_reader import ToolReader
 
 BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0
@@ -82,6 +87,10 @@ class OpcUaConnection:
         self._heard_s = clock()
         self._failures = 0
         self._delivery: Delivery | None = None
+        self._events: EventWatch | None = None
+        self._tools: ToolReader | None = None
+        self._life_reader: LifeReader | None = None
+        self._tool_index: int | None = None
         self._outage: tuple[str, int] | None = None
         self._started_ms = 0
         self._stamps_apart_ms: int | None = None
@@ -90,7 +99,8 @@ class OpcUaConnection:
         self.last_error = _unsafe(config)
 
     def follow(self, cursor: Cursor) -> None:
-        """Hear where the parser stands; a subscription does not depend on it."""
+        """Hear where the parser stands: which of the tools is in the spindle, where it is found from their places."""
+        self._tool_index = index_in_spindle(cursor.tools, self._config.source.spindle_place)
 
     def silent_s(self) -> float:
         """Seconds since the server was heard."""
@@ -156,7 +166,8 @@ class OpcUaConnection:
         self.reconnects += 1
         self._failures += 1
         self.last_error = str(error)
-        delivery, self._delivery = self._delivery, None
+        delivery, self._delivery, self._events = self._delivery, None, None
+        self._tools = self._life_reader = None
         if delivery is not None and self._outage is None:
             self._outage = "session lost", delivery.heard_ms
 
@@ -180,6 +191,7 @@ class OpcUaConnection:
                     assert self._delivery is not None
                     self._hand_on(self._delivery.tick(self._now_ms(), self._clock()))
                     if self._delivery.is_open:
+                        await self._ask()
                         self._emit(Load(()), reading, status)
                     await asyncio.sleep(self._watch_s * self._chance.uniform(0.7, 1.0))  # never at one phase of its clock
             except session.FAILURES as error:
@@ -207,30 +219,31 @@ class OpcUaConnection:
         )
 
     async def _subscribe(self, client: "Client", nodes: "list[Resolved]", _status: "ServerStatus") -> None:
-        from edge.controls.opcua import plain, session  # noqa: PLC0415  asyncua is an extra
+        from edge.controls.opcua import event_session, life_reader, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
-        watched: Watched | None = None
         early: list[ua.PublishResult] = []
+        there = [(one.key, one.node) for one in nodes if one.node is not None]
         elements = {one.key: one.point.element for one in nodes}
+        watched: Watched | None = None
 
         def heard(result: "ua.PublishResult") -> None:
-            if watched is None:
+            if watched is None or self._delivery is None:
                 early.append(result)  # before its handles are known
-                return
-            parts = result.NotificationMessage.NotificationData or ()
-            items = [item for part in parts for item in getattr(part, "MonitoredItems", ())]
-            values = [(watched.keys.get(int(item.ClientHandle)), item.Value) for item in items]
-            known = [(key, value) for key, value in values if key is not None and value is not None]
-            facts = tuple(
-                plain.as_fact(key, value, element=elements[key], stamps=self._config.source.timestamps) for key, value in known
-            )
-            self._compare([plain.stamps_apart_ms(value) for _, value in known])
-            overflowed = tuple(key for key, value in known if plain.overflowed(value))
-            self._heard(Notification(int(result.NotificationMessage.SequenceNumber), facts, overflowed, not parts))
+            else:
+                self._published(result, watched, elements)
 
-        there = [(one.key, one.node) for one in nodes if one.node is not None]
         watched = await session.watch(self._config, client, there, self._keep_alive_s, heard)
         faults = {one.key: one.fault for one in nodes if one.node is None} | watched.refused
+        facts = [Fact(key, fault=fault) for key, fault in faults.items()]
+        told = await event_session.listen(self._config, client, watched.subscription)
+        if told is not None:
+            self._events = event_session.EventWatch(client, watched.subscription, told, self._clock)
+            facts += filter(None, (self._events.about, await self._events.tick()))
+        namespaces = await client.get_namespace_array()
+        self._tools = tool_reader.ToolReader(self._config, client, namespaces, self._clock)
+        self._life_reader = life_reader.LifeReader(client, nodes, namespaces, self._clock)
+        self._tools.heard(await self._found(client, [one for one in nodes if one.key == tool_reader.TOOL_NUMBER]))
+        facts += await self._tools.tick()
         keep_alive_s = max(self._keep_alive_s, watched.publishing_ms / 1000)
         self._delivery = Delivery(
             items=frozenset(watched.keys.values()),
@@ -240,12 +253,46 @@ class OpcUaConnection:
             silent_s_max=KEEP_ALIVES_MISSED * keep_alive_s,
             began_ms=self._now_ms(),
             began_s=self._clock(),
-            faults=tuple(Fact(key, fault=fault) for key, fault in faults.items()),
+            faults=tuple(facts),
             outage=self._outage,
+            awaits_refresh=self._events is not None and self._events.is_waiting,
         )
         self._hand_on(self._delivery.tick(self._now_ms(), self._clock()))
         for result in early:
             heard(result)
+
+    async def _found(self, client: "Client", nodes: "list[Resolved]") -> list[Fact]:
+        """Return the present values of these nodes."""
+        from edge.controls.opcua import plain, session  # noqa: PLC0415  asyncua is an extra
+
+        there = [(one, one.node) for one in nodes if one.node is not None]
+        values = await session.read_values(client, [node for _, node in there]) if there else []
+        return [plain.as_fact(one.key, value, element=one.point.element) for (one, _), value in zip(there, values, strict=True)]
+
+    def _published(self, result: "ua.PublishResult", watched: "Watched", elements: "Mapping[str, int | None]") -> None:
+        from edge.controls.opcua import plain  # noqa: PLC0415  asyncua is an extra
+
+        parts = result.NotificationMessage.NotificationData or ()
+        items = [item for part in parts for item in getattr(part, "MonitoredItems", ())]
+        values = [(watched.keys.get(int(item.ClientHandle)), item.Value) for item in items]
+        known = [(key, value) for key, value in values if key is not None and value is not None]
+        stamps = self._config.source.timestamps
+        facts = [plain.as_fact(key, value, element=elements[key], stamps=stamps) for key, value in known]
+        facts += [] if self._events is None else self._events.facts(parts)
+        if self._tools is not None:
+            self._tools.heard(facts)
+        self._compare([plain.stamps_apart_ms(value) for _, value in known])
+        overflowed = [key for key, value in known if plain.overflowed(value)]
+        overflowed += [EVENTS for fact in facts if fact.key == EVENT and Event.kind_of(fact) is Kind.OVERFLOW]
+        self._heard(Notification(int(result.NotificationMessage.SequenceNumber), tuple(facts), tuple(overflowed), not parts))
+
+    async def _ask(self) -> None:
+        """Have the alarms repeated, and read what belongs to the tool in the spindle, where that is due."""
+        fault = None if self._events is None else await self._events.tick()
+        of_tool = [] if self._tools is None else await self._tools.tick()
+        of_tool += [] if self._life_reader is None else await self._life_reader.tick(self._tool_index)
+        if fault is not None or of_tool:
+            self._emit(Load((*([] if fault is None else [fault]), *of_tool)))
 
     def _compare(self, apart_ms: list[int | None]) -> None:
         """Note how close the samples' stamps ever come to the server's clock; an old value may be far from it."""
@@ -255,8 +302,11 @@ class OpcUaConnection:
 
     def _heard(self, told: Notification) -> None:
         assert self._delivery is not None
-        self._heard_s = self._clock()
-        self._hand_on(self._delivery.take(told, self._now_ms(), self._clock()))
+        self._heard_s, was_open = self._clock(), self._delivery.is_open
+        loads = self._delivery.take(told, self._now_ms(), self._clock())
+        if was_open and self._events is not None and any(load.holes for load in loads):
+            self._events.missed()
+        self._hand_on(loads)
 
     def _check_silence(self) -> None:
         """A server that answers reads but publishes nothing, not even keep-alives, has lost the subscription."""
@@ -285,6 +335,8 @@ class OpcUaConnection:
         except queue.Full:
             facts = len(load.facts) + sum(hole.lost for hole in load.holes)
             since_ms = min((hole.from_ms for hole in load.holes), default=now_ms)
+            if self._events is not None:
+                self._events.missed()
             self._overflow = _Lost(since_ms, facts) if lost is None else _Lost(min(lost.from_ms, since_ms), lost.facts + facts)
         else:
             self._number += 1

@@ -1,7 +1,8 @@
 """The frames of an OPC UA server as samples: deliveries of a subscription in the order of their own time stamps.
 
 The connection names each value by the signal that it stands for (`edge.controls.opcua.point`), or `tool:<n>:<field>` where the
-tool in the spindle has to be found from where each tool is. Everything else happens here: words, units, plausibility.
+tool in the spindle has to be found from where each tool is; events keep their own keys (`edge.controls.opcua.event`). Everything
+else happens here: words, units, plausibility.
 """
 
 import re
@@ -9,21 +10,25 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import groupby
+from typing import NamedTuple
 
-from edge.controls.opcua.config import Config, points_of
+from edge.controls.opcua.alarm_samples import KEYS, Heard, told
+from edge.controls.opcua.config import Config, is_published, points_of
 from edge.controls.opcua.point import TOOL, Point
 from edge.controls.opcua.spindle_tool import Tools, in_spindle
 from edge.controls.opcua.spindle_tool import told as tool_told
+from edge.controls.opcua.tool_life import TOOL_LIFE, Limits, counted_up, life_samples, noted
 from edge.errors import ConfigError
 from edge.place import Place
 from edge.reading import Target, bad, read_value
-from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet
+from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet, observations_of
 from edge.signals import signal
 from edge.sweep import Fact, Sweep, SweepPosition, take
 from edge.units import conversion
 from sparkplug.quality import Quality
 
 MEANINGS_MAX = 4096
+ALARM = "alarm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +40,42 @@ class Meaning:
     prefix: str = ""
     source: str = ""
     native_unit: str = ""
+    unit: str = ""
+    counts_down_from: str = ""
+
+    @property
+    def offer(self) -> Offer:
+        """Return what the birth certificate says of it."""
+        one = self.target
+        return Offer(one.signal, self.source, self.native_unit, one.low, one.high, self.unit, one.kind)
 
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet)."""
+    """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
+
+    tool_ms: since when it is that one
+    heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
+    limits: the last values of signals from which others count down; life: signals of a tool's life that were published
+    """
 
     position: SweepPosition = field(default_factory=SweepPosition)
     meanings: tuple[Meaning, ...] = ()
     unmapped: tuple[str, ...] = ()
     tools: Tools = ()
     tool: str = "?"
+    tool_ms: int = 0
+    heard: Heard = field(default_factory=Heard)
+    alarm_variable: Fact | None = None
+    limits: Limits = ()
+    life: tuple[str, ...] = ()
+
+
+class _Both(NamedTuple):
+    """The samples of a frame: of variables, and of events."""
+
+    values: tuple[EdgeSample, ...]
+    events: tuple[EdgeSample, ...]
 
 
 def start(_config: Config) -> Cursor:
@@ -71,16 +101,68 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
         return replace(cursor, position=taken.position), taken.about
     is_new = sweep.life != cursor.position.life
     before = Cursor() if is_new else cursor
-    after = _learned(config, replace(before, position=taken.position), sweep.facts)
-    after, samples, dropped = _samples(config, after, sweep, taken.is_baseline)
-    offers = _offers(after) if is_new or after.meanings != before.meanings or bool(after.tools) != bool(before.tools) else None
-    return after, replace(taken.about, samples=samples, dropped=dropped, offers=offers)
+    spoken_facts = [fact for fact in sweep.facts if fact.key in KEYS]
+    values = tuple(fact for fact in sweep.facts if fact.key not in KEYS)
+    after = _learned(config, replace(before, position=taken.position), values)
+    spoken = told(after.heard, spoken_facts, sweep.t_ms, sweep.number)
+    after, found, dropped = _samples(config, after, replace(sweep, facts=values), taken.is_baseline)
+    of_all = Counter(dropped) + spoken.dropped
+    gave_up = after.heard.is_authority and not spoken.heard.is_authority
+    after = replace(after, heard=spoken.heard)
+    both = _Both(found, _published(config, spoken.samples, of_all))
+    after, samples = _one_alarm(config, after, sweep, both=both, dropped=of_all, gave_up=gave_up)
+    if not taken.is_baseline:
+        samples = tuple(sorted(samples, key=lambda sample: sample.timestamp_ms))
+    offers = _offers(config, after) if is_new or _offered(after) != _offered(before) else None
+    return after, replace(taken.about, samples=samples, dropped=dict(+of_all), offers=offers)
+
+
+def _offered(cursor: Cursor) -> tuple[object, ...]:
+    """Return what the offers depend on."""
+    return cursor.meanings, cursor.life, bool(cursor.tools), cursor.heard.offers(), cursor.heard.is_authority
+
+
+def _published(config: Config, events: tuple[EdgeSample, ...], dropped: Counter[str]) -> tuple[EdgeSample, ...]:
+    """Return the samples of events that the configuration does not keep back."""
+    hidden = tuple(sample for sample in events if not is_published(config, sample.signal))
+    dropped[Drop.UNMAPPED] += observations_of(hidden)
+    return tuple(sample for sample in events if sample not in hidden)
+
+
+def _one_alarm(
+    config: Config, cursor: Cursor, sweep: Sweep, *, both: _Both, dropped: Counter[str], gave_up: bool
+) -> tuple[Cursor, tuple[EdgeSample, ...]]:
+    """Let one source tell the signal `alarm`: the events where they tell all alarms, else the variable where the map has one.
+
+    gave_up: the events have just turned out not to tell all
+    """
+    newest = next((fact for fact in reversed(sweep.facts) if fact.key == ALARM), None)
+    after = replace(cursor, alarm_variable=newest or cursor.alarm_variable)
+    variable = _alarm_variable(config, after)
+    if variable is None:
+        superseded = tuple(sample for sample in both.values if sample.signal == ALARM)
+        dropped[Drop.EVIDENCE] += observations_of(superseded)
+        return after, (*(sample for sample in both.values if sample not in superseded), *both.events)
+    shown = tuple(sample for sample in both.events if sample.signal != ALARM)
+    kept = cursor.alarm_variable if gave_up and newest is None else None
+    again = () if kept is None else (replace(_sample(variable, kept, sweep), observations=0),)
+    return after, (*both.values, *again, *shown)
+
+
+def _alarm_variable(config: Config, cursor: Cursor) -> Meaning | None:
+    """Return the variable that tells the signal `alarm`; None where the events do, or where there is none."""
+    section = config.signals.get(ALARM)
+    if cursor.heard.is_authority and not (section and section.data_item):
+        return None
+    return next((meaning for meaning in cursor.meanings if meaning.target.signal == ALARM), None)
 
 
 def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
     """Return what keys mean that have not come before in this life."""
     known = {meaning.target.data_item_id for meaning in cursor.meanings} | set(cursor.unmapped)
-    fresh = [key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key)]
+    fresh = [
+        key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key) and key != TOOL_LIFE
+    ]
     if not fresh or len(known) + len(fresh) > MEANINGS_MAX:
         return cursor
     points, found = points_of(config), list[Meaning]()
@@ -106,22 +188,32 @@ def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | Non
         return None
     if section is not None and not section.publish:
         return None
+    chosen = next((one for one in config.chosen if one.signal == key), None)
+    if chosen is not None:
+        return Meaning(chosen.target(key), source=point.label, unit=chosen.unit)
     low = section.low if section and section.low is not None else known.low
     high = section.high if section and section.high is not None else known.high
     scale = point.scale * (section.scale if section else 1.0)
-    target = Target(key, key, way.factor * scale, way.offset, low, high)
-    return Meaning(target, tuple(point.words.items()), point.prefix, point.label, native)
+    is_left = bool(point.counts_down_from)  # what is left of a life may be below zero
+    target = Target(key, key, way.factor * scale, way.offset, None if is_left else low, None if is_left else high)
+    words = tuple(point.words.items())
+    return Meaning(target, words, point.prefix, point.label, native, counts_down_from=point.counts_down_from)
 
 
 def _stands_for(template: str, key: str) -> bool:
     return re.fullmatch(re.escape(template).replace(re.escape("{name}"), r"[a-z]\d{0,2}"), key) is not None
 
 
-def _offers(cursor: Cursor) -> tuple[Offer, ...]:
-    offers = [Offer(m.target.signal, m.source, m.native_unit, m.target.low, m.target.high) for m in cursor.meanings]
+def _offers(config: Config, cursor: Cursor) -> tuple[Offer, ...]:
+    offers = {meaning.target.signal: meaning.offer for meaning in cursor.meanings}
     if cursor.tools:
-        offers.append(Offer("tool_number", "ToolType/Location"))
-    return tuple(offers)
+        offers["tool_number"] = Offer("tool_number", "ToolType/Location")
+    offers |= {name: Offer(name, "ToolType/ToolLife") for name in cursor.life}
+    for offer in cursor.heard.offers():
+        is_ours = offer.signal not in offers or (offer.signal == ALARM and _alarm_variable(config, cursor) is None)
+        if is_ours and is_published(config, offer.signal):
+            offers[offer.signal] = offer
+    return tuple(offers.values())
 
 
 def _samples(
@@ -129,6 +221,7 @@ def _samples(
 ) -> tuple[Cursor, tuple[EdgeSample, ...], dict[str, int]]:
     """The facts in the order of their time stamps. What is found on joining is one state: its tools are looked at once."""
     meanings = {meaning.target.data_item_id: meaning for meaning in cursor.meanings}
+    limiting = {meaning.counts_down_from for meaning in cursor.meanings}
     dropped: Counter[str] = Counter()
     samples: list[EdgeSample] = []
     ordered = sorted(sweep.facts, key=lambda fact: sweep.t_ms if fact.t_ms is None else fact.t_ms)
@@ -140,9 +233,19 @@ def _samples(
             dropped[Drop.UNCHANGED] += len(placed) - (0 if sample is None else 1)
             samples += [] if sample is None else [sample]
         for fact in moment:
+            if fact.key == TOOL_LIFE:
+                stamp_ms = max(fact.t_ms or cursor.tool_ms or sweep.t_ms, cursor.tool_ms)  # not before the tool came
+                found = life_samples(fact, cursor.life, stamp_ms)
+                found = tuple(sample for sample in found if is_published(config, sample.signal))
+                cursor = replace(cursor, life=tuple(sorted({*cursor.life, *(sample.signal for sample in found)})))
+                dropped[Drop.UNMAPPED] += 1 - observations_of(found)
+                samples += found
+                continue
             meaning = meanings.get(fact.key)
             if meaning is not None:
-                samples.append(_sample(meaning, fact, sweep))
+                sample = counted_up(_sample(meaning, fact, sweep), meaning.counts_down_from, cursor.limits)
+                cursor = replace(cursor, limits=noted(cursor.limits, sample)) if sample.signal in limiting else cursor
+                samples.append(sample)
             elif not _is_tool(fact.key):
                 dropped[Drop.UNMAPPED] += 1
     marked = tuple(replace(sample, is_baseline=is_baseline) for sample in samples)
@@ -182,6 +285,7 @@ def _tool(config: Config, cursor: Cursor, placed: Iterable[Fact], sweep: Sweep) 
     after = replace(cursor, tools=tools, tool=shown)
     if shown == cursor.tool:
         return after, None
+    after = replace(after, tool_ms=at_ms)
     if not is_known:
         why = f"no one tool is at the place {config.source.spindle_place!r}"
         return after, EdgeSample("tool_number", None, at_ms, Quality.BAD, why, sweep.number)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from math import ceil
 from typing import NamedTuple
 
+from edge.controls.opcua.event import EVENT, Event, Kind
 from edge.sweep import Fact, Hole
 
 SEQUENCE_MAX = 2**32 - 1
@@ -39,6 +40,7 @@ class Delivery:
     items: the keys that it watches; sampled_ms: how often each is sampled at most, 0 = not known, then `queue_size` in each
     `publishing_ms` is the most that can be lost; faults: keys that cannot be watched, with the reason
     outage: the hole before this subscription, without its end; None where it is the first one
+    awaits_refresh: the alarms that are there were asked for, and belong to the state as found
     began_ms, now_ms: the edge's calendar, which holes are stated in; began_s, at_s: its monotonic clock, for silence
     """
 
@@ -51,11 +53,13 @@ class Delivery:
     began_s: float
     faults: tuple[Fact, ...] = ()
     outage: tuple[str, int] | None = None
+    awaits_refresh: bool = False
     heard_ms: int = 0
     heard_s: float = 0.0
     _next: int = 1
     _opening: dict[str, Fact] | None = field(default_factory=dict)
     _later: list[Fact] = field(default_factory=list)
+    _events: list[Fact] = field(default_factory=list)
     _pending: list[Hole] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -69,7 +73,10 @@ class Delivery:
             return [Load(told.facts, tuple(holes))] if told.facts or holes else []
         self._pending += holes
         for fact in told.facts:
-            if fact.key in self._opening:
+            if fact.key == EVENT:
+                self._events.append(fact)
+                self.awaits_refresh &= Event.kind_of(fact) is not Kind.REFRESH_END
+            elif fact.key in self._opening:
                 self._later.append(fact)
             else:
                 self._opening[fact.key] = fact
@@ -79,13 +86,14 @@ class Delivery:
         """The state as found, once it is whole or has waited long enough; nothing later on."""
         if self._opening is None:
             return []
-        if len(self._opening) < len(self.items) and at_s - self.began_s < OPENING_S_MAX:
+        is_whole = len(self._opening) >= len(self.items) and not self.awaits_refresh
+        if not is_whole and at_s - self.began_s < OPENING_S_MAX:
             return []
         outage = [] if self.outage is None else [self.hole(*self.outage, now_ms)]
-        loads = [Load((*self.faults, *self._opening.values()), (*outage, *self._pending))]
+        loads = [Load((*self.faults, *self._opening.values(), *self._events), (*outage, *self._pending))]
         if self._later:
             loads.append(Load(tuple(self._later)))
-        self._opening, self._later, self._pending = None, [], []
+        self._opening, self._later, self._pending, self._events = None, [], [], []
         return loads
 
     @property

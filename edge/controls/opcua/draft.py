@@ -11,7 +11,8 @@ from urllib.parse import parse_qsl
 from pydantic import ValidationError
 
 from edge.config import EdgeConfig, one_line
-from edge.controls.opcua.check import read_all, run
+from edge.controls.opcua.alarm_samples import Heard
+from edge.controls.opcua.check import alarm_rows, read_all, read_events, run
 from edge.controls.opcua.config import Config, OpcUaConfig
 from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.library import require
@@ -22,7 +23,7 @@ from edge.signals import signal
 from edge.sweep import Sweep
 from edge.units import conversion
 
-SHOWN_MAX = 200
+SHOWN_MAX, SHOWN_ALARMS_MAX = 200, 20
 _NO_FILE = Path("the address")  # what messages name in place of a file
 _UNITS = {
     "m/min": "METER/MINUTE",
@@ -32,16 +33,25 @@ _UNITS = {
     "m": "METER",
     "rad": "RADIAN",
 }
+_BY_ADDRESS = [
+    "",
+    "# [variables]                     # R parameters and user data (GUD), by number or path; signal variable_<name>",
+    '# part_width = { address = "R10", unit = "mm" }',
+    "# [plc]                           # PLC addresses as the maker's lists have them; signal plc_<name>",
+    '# coolant_pressure = { address = "DB100.DBW2", unit = "bar", scale = 0.1 }',
+    '# door_open = { address = "M5.0", kind = "flag" }',
+]
 
 
 class Looked(NamedTuple):
-    """The findings: by model what it gives, the best of them, the units that it declares; else the server's variables."""
+    """The findings: by model what it gives, the best of them, its units, events and alarms; else the server's variables."""
 
     found: dict[str, SampleSet]
     best: str
     units: dict[str, str]
     variables: list[str]
     fingerprint: str
+    heard: Heard
 
 
 def draft(url: str, device: str) -> str:
@@ -84,24 +94,31 @@ async def _look(config: Config, client: Any) -> Looked:
         facts = await read_all(with_map, client, nodes)
         found[name] = parse(with_map, start(with_map), Sweep("draft", 0, 1, facts).encode())[1]
         units[name] = await session.units_of(client, {one.key: one.node for one in nodes if one.node is not None})
-    best = max(models, key=lambda name: _worth(found[name]), default="")
+    best = max(models, key=lambda name: _worth(name, found[name]), default="")
+    with_best = EdgeConfig(source=config.source.model_copy(update={"map": best}))
+    spoken = await read_events(with_best, client)
+    heard = parse(with_best, start(with_best), Sweep("draft", 0, 1, spoken).encode())[0].heard
     shown = [] if best else await resolve.browse(client, namespaces, "")
     variables = [resolve.name_of(one.node, namespaces) for one in shown if one.is_variable][:SHOWN_MAX]
     pinned = session.fingerprint_of(client)
-    return Looked(found, best, units.get(best, {}), variables, pinned)
+    return Looked(found, best, units.get(best, {}), variables, pinned, heard)
 
 
-def _worth(found: SampleSet) -> tuple[bool, int]:
-    """Return which of two models to take: the one that knows the tool, then the one with more signals that have a value."""
+def _worth(name: str, found: SampleSet) -> tuple[bool, bool, int]:
+    """Return which of two models to take: the one that knows the tool, the control's own, the one with more values.
+
+    A SINUMERIK that shows a companion model as well is a SINUMERIK: only its own names lead to tools, parameters and the PLC.
+    """
     there = {sample.signal for sample in found.samples if sample.value is not None or sample.reason == "empty"}
-    return "tool_number" in there, len(there)
+    return "tool_number" in there, maps()[name].is_native, len(there)
 
 
 def _text(config: Config, device: str, looked: Looked) -> str:
     source, best = config.source, looked.best
     lines = [
         f"# Drafted from {source.url}. Compare the values of `cnctwin edge check` with the control's screen before you go on.",
-        *(f"# It follows {maps()[name].title}: {len(one.offers or ())} signals" for name, one in looked.found.items()),
+        *(_model(name, one, name == best) for name, one in looked.found.items()),
+        *_alarms(looked.heard),
         "",
         "[machine]",
         f"name = {_quoted(device or 'machine')}",
@@ -118,7 +135,29 @@ def _text(config: Config, device: str, looked: Looked) -> str:
     if source.username:
         lines += [f"username = {_quoted(source.username)}", f"password_env = {_quoted(source.password_env)}"]
     lines += ["", *(_signals(looked.found[best], looked.units) if best else _unknown(looked.variables))]
+    lines += _BY_ADDRESS if best and maps()[best].is_native else []
     return "\n".join(lines) + "\n"
+
+
+def _model(name: str, found: SampleSet, is_best: bool) -> str:
+    """Return what the server is found to be, or to follow besides."""
+    given = sum(sample.value is not None for sample in found.samples)
+    what = "It is a" if maps()[name].is_native else "It follows"
+    return f"# {what} {maps()[name].title}: {given} of {len(found.offers or ())} signals{', mapped below' if is_best else ''}"
+
+
+def _alarms(heard: Heard) -> list[str]:
+    """Return where alarms come from, and which are there, as comments."""
+    table = heard.table
+    if not heard.source:
+        return [f"# Alarms: {table.why_not}"]
+    known = f"{len(table.alarms)} now" if not table.why_not else table.why_not
+    shown = [f"#   {row.signal.removeprefix('(alarm) ')}: {row.value}" for row in alarm_rows(heard)[:SHOWN_ALARMS_MAX]]
+    return [f"# Alarms: events of {heard.source}, {known}", *(_printable(line) for line in shown)]
+
+
+def _printable(text: str) -> str:
+    return "".join(char if char.isprintable() else " " for char in text)
 
 
 def _signals(found: SampleSet, units: dict[str, str]) -> list[str]:

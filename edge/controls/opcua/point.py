@@ -49,9 +49,11 @@ class Point(_Frozen):
     """One value to read.
 
     signal: a canonical name; {name} stands for the name of the object that has it
-    node: its name; or else `of`, the type of the objects that have it, and `path` from there (browse names, "/" between)
+    node: its name, in which {tool} stands for the number of the tool in the spindle; or else `of`, the type of the objects that
+    have it, and `path` from there (browse names, "/" between)
     only_if, only_if_not: a flag beside it that decides whether it is read at all
     element: which element of an array is meant
+    counts_down_from: the signal of the limit, where the value is what is left of it and not what was used
     words: canonical words, or texts, by native value; prefix: a text that is taken off the front of the value
     seen: on what it rests; "" = nothing that we have read says so
     """
@@ -68,6 +70,7 @@ class Point(_Frozen):
     scale: float = 1.0
     words: dict[str, str] = Field(default_factory=dict)
     prefix: str = ""
+    counts_down_from: str = ""
     seen: str = ""
 
     @field_validator("node")
@@ -84,17 +87,35 @@ class Point(_Frozen):
         return self
 
     @property
+    def follows_tool(self) -> bool:
+        """Return True if the node is another one for each tool."""
+        return "{tool}" in self.node
+
+    def node_for(self, tool: int) -> str:
+        """Return the node of this tool."""
+        return self.node.replace("{tool}", str(tool))
+
+    @property
     def label(self) -> str:
         """Return what people call it."""
         return self.node or f"{self.of}/{self.path}"
 
 
 class PointMap(_Frozen):
-    """A file of points. `namespace` is the model's: a server that lists it follows this map."""
+    """A file of points. `namespace` is the model's: a server that lists it follows this map.
+
+    events: the node whose events are the alarms; "" = the Server object, which has those of all
+    """
 
     title: str
     namespace: str
+    events: str = ""
     points: tuple[Point, ...]
+
+    @property
+    def is_native(self) -> bool:
+        """Return True for the map of one make of control, which names nodes; a companion model names types."""
+        return all(point.node for point in self.points)
 
 
 @cache

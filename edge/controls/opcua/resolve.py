@@ -30,12 +30,16 @@ _HIERARCHICAL = ua.NodeId(ua.Int32(ObjectIds.HierarchicalReferences))
 
 
 class Resolved(NamedTuple):
-    """A key, the node that feeds it, the point behind it; `fault` in place of the node where there is none."""
+    """A key, the node that feeds it, the point behind it; `fault` in place of the node where there is none.
+
+    owner: the object that has the node, where that was found by its type
+    """
 
     key: str
     node: ua.NodeId | None
     point: Point
     fault: str = ""
+    owner: ua.NodeId | None = None
 
 
 class BrowsedNode(NamedTuple):
@@ -51,7 +55,7 @@ class BrowsedNode(NamedTuple):
 
 async def resolve(config: Config, client: Client) -> list[Resolved]:
     """Every point of the configuration on this server; those that the server does not have are there with the reason."""
-    points = points_of(config)
+    points = [point for point in points_of(config) if not point.follows_tool]
     namespaces = await client.get_namespace_array()
     resolved = [_by_name(point, namespaces) for point in points if point.node]
     browsed = [point for point in points if not point.node]
@@ -101,7 +105,7 @@ async def _by_type(
     asked = [
         (point, found, number) for point in points for number, found in enumerate(chosen[point.of]) if point.each or not number
     ]
-    nodes = await _follow(client, [(found.node, point.path) for point, found, _ in asked], namespaces, model)
+    nodes = await follow(client, [(found.node, point.path) for point, found, _ in asked], namespaces, model)
     flags = await _flags(client, asked, namespaces, model)
     resolved = [
         Resolved(point.signal, None, point, f"the server has no object of type {point.of}")
@@ -118,7 +122,7 @@ async def _by_type(
             key = point.signal.replace("{name}", re.sub(r"\W", "", found.name).lower())
         if node is not None or not point.each:
             fault = "" if node else f"the server has no {found.name}/{point.path}"
-            resolved.append(Resolved(key, node, point, fault))
+            resolved.append(Resolved(key, node, point, fault, found.node))
     return _first_of_each(resolved)
 
 
@@ -145,7 +149,7 @@ async def _flags(
 ) -> dict[tuple[str, str], object]:
     """The values of the flags that decide whether a point is read at all."""
     wanted = {(str(found.node), flag): found.node for point, found, _ in asked if (flag := point.only_if or point.only_if_not)}
-    nodes = await _follow(client, [(node, flag) for (_, flag), node in wanted.items()], namespaces, model)
+    nodes = await follow(client, [(node, flag) for (_, flag), node in wanted.items()], namespaces, model)
     there = [(key, node) for key, node in zip(wanted, nodes, strict=True) if node is not None]
     if not there:
         return {}
@@ -153,7 +157,7 @@ async def _flags(
     return {key: None if v.Value is None else v.Value.Value for (key, _), v in zip(there, values, strict=True)}
 
 
-async def _follow(
+async def follow(
     client: Client, starts: Sequence[tuple[ua.NodeId, str]], namespaces: Sequence[str], model: str
 ) -> list[ua.NodeId | None]:
     """The nodes at the ends of these paths. A browse name may be in the model's namespace, or in any other."""
@@ -191,7 +195,7 @@ async def browse(client: Client, namespaces: Sequence[str], model: str, stop_at:
     waiting: deque[tuple[ua.NodeId, tuple[str, ...]]] = deque([(root, ())])
     while waiting and len(found) < NODES_MAX and time.monotonic() - begun_s < BROWSE_S_MAX:
         some = [waiting.popleft() for _ in range(min(AT_ONCE, len(waiting)))]
-        for (_, path), references in zip(some, await _children(client, [node for node, _ in some]), strict=True):
+        for (_, path), references in zip(some, await children_of(client, [node for node, _ in some]), strict=True):
             await _name_types(client, references, names, namespaces, model)
             for reference in references:
                 key = str(reference.NodeId)
@@ -215,7 +219,7 @@ def _found(
     return BrowsedNode(node, namespace, name, names.get(str(reference.TypeDefinition), ""), is_variable, (*path, name))
 
 
-async def _children(client: Client, nodes: Sequence[ua.NodeId]) -> list[list[ua.ReferenceDescription]]:
+async def children_of(client: Client, nodes: Sequence[ua.NodeId]) -> list[list[ua.ReferenceDescription]]:
     """Objects and variables one level below, with those that the server holds back for a second question."""
     wishes = [
         ua.BrowseDescription(

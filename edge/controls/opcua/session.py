@@ -222,6 +222,7 @@ async def read_values(client: Client, nodes: Sequence[ua.NodeId]) -> list[ua.Dat
 class Watched(NamedTuple):
     """A subscription: its id, the keys by client handle, those that cannot be watched, and what the server made of our wishes."""
 
+    subscription: int
     keys: dict[int, str]
     refused: dict[str, str]
     publishing_ms: float
@@ -261,7 +262,7 @@ async def watch(
                 queue_size = max(queue_size, int(result.RevisedQueueSize))
             else:
                 refused[keys.pop(begin + number + 1)] = status_name(result.StatusCode)
-    return Watched(keys, refused, float(made.RevisedPublishingInterval), sampled_ms, queue_size)
+    return Watched(int(made.SubscriptionId), keys, refused, float(made.RevisedPublishingInterval), sampled_ms, queue_size)
 
 
 def _item(config: Config, handle: int, node: ua.NodeId) -> ua.MonitoredItemCreateRequest:

@@ -54,6 +54,12 @@ def in_spindle(tools: Tools, place: str) -> tuple[int | None, bool]:
     return None, any(tool.place is not None or tool.place_number is not None for tool in tools)
 
 
+def index_in_spindle(tools: Tools, place: str) -> int | None:
+    """Return which of the list is there; None where none is, or more than one."""
+    there = [tool.index for tool in tools if _is_at(tool, place)]
+    return there[0] if len(there) == 1 else None
+
+
 def _is_at(tool: PlacedTool, place: str) -> bool:
     if place.isdigit():
         return tool.place_number == int(place)

@@ -36,6 +36,7 @@ class Reader:
         try:
             for raw in self._frames:
                 self._cursor, one = parse(self._config, self._cursor, raw)
+                self.connection.follow(self._cursor)
                 assert one.accounted()
                 self.seen.append(one)
                 if told(one):
@@ -64,7 +65,7 @@ def test_first_the_state_as_found_then_each_change_with_the_controls_own_time(be
         first = reader.until(lambda one: bool(one.samples))
         assert {s.signal: s.value for s in first.samples}["tool_number"] == 3
         assert all(s.is_baseline for s in first.samples)
-        assert len(first.offers or ()) == 16
+        assert len(first.offers or ()) == 26
         bench.show(ControlState(tool_number=3, exec_state="ACTIVE", program="O1", line=6, block="T4 M6"))
         bench.show(ControlState(tool_number=0, exec_state="ACTIVE", program="O1", line=6, block="T4 M6"))
         bench.show(ControlState(tool_number=4, exec_state="ACTIVE", program="O1", line=7))

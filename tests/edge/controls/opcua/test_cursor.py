@@ -127,7 +127,22 @@ def test_an_edge_that_was_away_knows_until_when_it_had_everything() -> None:
 
 _plain = st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False) | st.text(max_size=8)
 _keys = st.sampled_from(
-    ["tool_number", "exec_state", "nc_block", "spindle_rpm", "axis_x_pos_mm", "tool:0:Name", "tool:x:y", "tool:1:"]
+    [
+        "tool_number",
+        "exec_state",
+        "nc_block",
+        "spindle_rpm",
+        "axis_x_pos_mm",
+        "tool:0:Name",
+        "tool:x:y",
+        "tool:1:",
+        "event",
+        "events",
+        "refresh",
+        "tool_life",
+        "tool_life_used_min",
+        "alarm",
+    ]
 )
 
 

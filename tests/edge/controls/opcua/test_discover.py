@@ -9,6 +9,7 @@ pytest.importorskip("asyncua")
 
 from asyncua import ua
 
+from cnctwin.standins.opcua_server.alarms import ShownAlarm
 from cnctwin.standins.simulated_control.state import ControlState
 from edge.config_file import parse
 from edge.controls.opcua import resolve, session
@@ -17,6 +18,10 @@ from edge.controls.opcua.draft import draft
 from edge.controls.opcua.point import node_of
 from edge.errors import ConfigError
 from tests.edge.controls.opcua.conftest import Bench
+
+
+def address(bench: Bench) -> str:
+    return f"{bench.server.url}?server_fingerprint={bench.server.fingerprint}&certificate_folder={bench.folder}/edge"
 
 
 def rows(bench: Bench, **source: object) -> dict[str, object]:
@@ -57,16 +62,33 @@ def test_a_channel_that_is_not_there_is_said_to_be_missing(bench: Bench) -> None
 
 def test_a_drafted_configuration_loads_and_shows_the_control_in_true_units(bench: Bench, tmp_path: Path) -> None:
     bench.show(ControlState(tool_number=4, feed_mm_min=1500.0))
-    text = draft(
-        f"{bench.server.url}?server_fingerprint={bench.server.fingerprint}&certificate_folder={bench.folder}/edge", 'M"1'
-    )
-    assert "# It follows SINUMERIK 828D, 840D sl, ONE: 16 signals" in text
-    assert "# It follows OPC 40501-1, machine tools: 7 signals" in text
+    text = draft(address(bench), 'M"1')
+    assert "# It is a SINUMERIK 828D, 840D sl, ONE: 25 of 25 signals, mapped below" in text
+    assert "# It follows OPC 40501-1, machine tools: 9 of 9 signals" in text
     config = parse(text.replace("[opcua]", f'[opcua]\ncertificate_folder = "{bench.folder}/edge"'), tmp_path / "mill.toml")
     assert config.machine.name == 'M"1'
-    assert config.source.map == "cnc_40502"
+    assert config.source.map == "sinumerik", "what a control calls its own is more than a model that it follows besides"
     assert config.source.server_fingerprint == bench.server.fingerprint
     assert {row.signal: row.value for row in describe(config)}["feed_mm_min"] == 1500.0
+
+
+def test_without_tools_of_its_own_a_control_is_drafted_by_the_model_that_knows_them_in_true_units(
+    bench: Bench, tmp_path: Path
+) -> None:
+    bench.show(ControlState(tool_number=4, feed_mm_min=1500.0))
+    bench.server.set_status("/Channel/State/actTNumber[u1,1]", "BadNotReadable")
+    text = draft(address(bench), "mill")
+    config = parse(text.replace("[opcua]", f'[opcua]\ncertificate_folder = "{bench.folder}/edge"'), tmp_path / "mill.toml")
+    assert config.source.map == "cnc_40502"
+    assert {row.signal: row.value for row in describe(config)}["feed_mm_min"] == 1500.0
+    assert config.signals["feed_mm_min"].native_unit == "METER/MINUTE"
+
+
+def test_a_draft_says_where_alarms_come_from_and_which_are_there(bench: Bench) -> None:
+    bench.server.set_alarms(ShownAlarm("700012", "Coolant\nlow", 500, acknowledged=False))
+    lines = draft(address(bench), "mill").splitlines()
+    assert "# Alarms: events of nsu=SinumerikVarProvider;s=Sinumerik, 1 now" in lines
+    assert any(line.startswith("#   700012: Coolant low, severity 500, active, not acknowledged") for line in lines)
 
 
 def test_an_address_may_say_how_to_get_in_and_what_it_says_is_checked(bench: Bench) -> None:
