@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from cnctwin.commands.figures.shown import show
-from cnctwin.commands.moment import moment_ms, moment_text
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.figures.comma_separated import to_csv
@@ -17,6 +16,7 @@ from cnctwin.figures.documents import read_records
 from cnctwin.figures.folding import folded
 from cnctwin.figures.table import Asked, By, table
 from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.terminal.moment import moment_ms, moment_text
 from processors.config import read_tables
 
 NAME = "production"

@@ -4,9 +4,9 @@ from typing import Any
 
 from rich.table import Table
 
-from cnctwin.commands.moment import moment_text
 from cnctwin.figures.table import By, Row
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.moment import moment_text
 
 _SHOWN = {
     By.MACHINE: ("machine", "shifts", "planned_s", "production_s", "unknown_s", "parts"),

@@ -11,6 +11,7 @@ from tests.cnctwin.page.fake_server import FakeServer, Shop
 
 WAIT_MS_MAX = 30_000  # the tests run beside others
 CHROMIUM = Path("/usr/bin/chromium")
+VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "parts/vmc", "figures", "jobs")
 SIZES = {"tablet": (1024, 768), "wall": (1280, 800), "phone": (390, 844)}
 
 

@@ -4,10 +4,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
-from tests.cnctwin.page.conftest import Visit
+from tests.cnctwin.page.conftest import VIEWS, Visit
 from tests.cnctwin.page.fake_server import FakeServer
 
-VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "parts/vmc", "jobs")
 RULES = {
     "resultTypes": ["violations"],
     "runOnly": {"type": "tag", "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]},

@@ -6,12 +6,11 @@ import time
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.cnctwin.page.conftest import SIZES, WAIT_MS_MAX, Visit
+from tests.cnctwin.page.conftest import SIZES, VIEWS, WAIT_MS_MAX, Visit
 from tests.cnctwin.page.documents import CHANGED, FAULTY, alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import SignalValue
 
-VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "parts/vmc", "jobs")
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 NUMBER = re.compile(r"[−+]?\d")
 INK = """async (selector) => {

@@ -1,6 +1,6 @@
 // A diagnosis.json in sections: the verdict, how far the gap shrank, where it lies, the causes, what cannot be told, what next.
 
-import { drawn, el, say, symbol } from "../dom.js";
+import { columnHead, drawn, el, say, symbol } from "../dom.js";
 import { lookup } from "../lookup.js";
 import { number, recorded, sentence, share, words } from "../text.js";
 import { partsSections } from "./diagnosis_parts.js";
@@ -96,7 +96,7 @@ function where(cells) {
             "tr",
             {},
             ["Signal", "Regime", "Share of the gap", "Floors", "In words"].map((text, i) =>
-              el("th", { scope: "col", class: i === 2 ? "number" : null }, text),
+              columnHead(text, i === 2),
             ),
           ),
         ),
@@ -153,7 +153,7 @@ function shrinks(gap) {
             "tr",
             {},
             ["Signal", "Before", "After", "Floor", "Unit", "● before, ■ after, over the floor (left edge), logarithmic"].map(
-              (text, i) => el("th", { scope: "col", class: i > 0 && i < 4 ? "number" : null }, text),
+              (text, i) => columnHead(text, i > 0 && i < 4),
             ),
           ),
         ),

@@ -4,7 +4,7 @@ import { get, query } from "../api.js";
 import { serverNow } from "../clock.js";
 import { drawn, el, table } from "../dom.js";
 import { lookup } from "../lookup.js";
-import { duration, moment, number, plain, sentence } from "../text.js";
+import { duration, fixed, moment, number, plain, sentence } from "../text.js";
 
 const HOUR_MS = 3600000;
 const STRETCHES = [
@@ -22,7 +22,7 @@ const BARS_MAX = 40;
 const PARTS_MAX = 200;
 const ALL = "";
 const list = (value) => (Array.isArray(value) ? value : []);
-const pct = (value) => (Number.isFinite(value) ? `${(100 * value).toFixed(1)} %` : "–");
+const pct = (value) => (Number.isFinite(value) ? `${fixed(100 * value, 1)} %` : "–");
 const kwh = (value) => (Number.isFinite(value) ? `${number(value)} kWh` : "–");
 const spent = (seconds) => (Number.isFinite(seconds) ? duration(1000 * Math.round(seconds)) : "–");
 const named = (row) => (row.shift === undefined ? row.machine : `${row.machine}, ${row.shift ?? "no shift"}`);
