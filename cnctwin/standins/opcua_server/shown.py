@@ -17,7 +17,7 @@ TOOLS = (1, 2, 3, 4, 5)
 Value = str | int | float | bool | list[str]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # looked up by itself, fifty times a second
 class Shown:
     """One variable. `kind` is the name of a VariantType.
 

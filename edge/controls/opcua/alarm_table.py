@@ -82,11 +82,10 @@ def fold(table: AlarmTable, event: Event, at_ms: int) -> AlarmTable:
 def _alarm(key: str, event: Event, before: Alarm | None, at_ms: int) -> Alarm:
     active = False if event.branch else event.active
     goes_on = before is not None and before.active is not False
-    since_ms = event.since_ms
-    if since_ms is None and active is not False:
-        since_ms = before.since_ms if before is not None and goes_on else at_ms
-    elif since_ms is None:
+    if active is False:  # the time of its transition is when it went
         since_ms = None if before is None else before.since_ms
+    else:
+        since_ms = event.since_ms or (before.since_ms if before is not None and goes_on else at_ms)
     return Alarm(key, event.code, event.text or event.name, event.severity, active, event.acknowledged, since_ms)
 
 

@@ -92,6 +92,7 @@ def test_since_is_when_it_became_active_whatever_changes_later() -> None:
     again = fold(fold(table, but(LOW, active=False), 10), LOW, 20)
     assert again.alarms[0].since_ms == 20
     assert fold(table, but(LOW, since_ms=4), 9).alarms[0].since_ms == 4
+    assert fold(table, but(LOW, active=False, since_ms=12), 12).alarms[0].since_ms == 1, "12 is when it went"
 
 
 def test_a_server_without_events_says_so_once_and_the_variable_goes_on() -> None:
