@@ -8,6 +8,7 @@ from typing import Any
 from tests.cnctwin.page.anomaly_document import anomaly
 from tests.cnctwin.page.diagnosis_document import diagnosis
 from tests.cnctwin.page.fake_server import Answer, Shop, now_ms
+from tests.cnctwin.page.figures_document import figures
 from tests.cnctwin.page.simulated_shop import CYCLE_S
 
 
@@ -281,6 +282,7 @@ def tell_all(shop: Shop) -> None:
         200,
         {"done": True, "text": f"acknowledged by {(body or {})['by']}"},
     )
+    shop.answers["/figures"] = lambda _path, asked: figures(asked or {})
     shop.answers["/anomaly/[^/]+"] = lambda path, _body: (200, anomaly(path.rpartition("/")[2]))
     for machine in machines:
         _tell_machine(shop, machine, machine == machines[0], started)
