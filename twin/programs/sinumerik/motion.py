@@ -1,0 +1,154 @@
+"""G0, G1 and the threads: from the words of a block to one canonical motion; arcs are in `circles`."""
+
+import math
+from typing import Final
+
+from twin.programs.canonical import Arc, ExactStop, Linear, Motion, Position, Rapid
+from twin.programs.pieces import in_plane, piece
+from twin.programs.planar import extent, tangent
+from twin.programs.planes import PLANES
+from twin.programs.refusal import RefusedError
+from twin.programs.sinumerik import circles, compensation, corners
+from twin.programs.sinumerik.codes import ARC_CODES
+from twin.programs.sinumerik.contour_angle import angled
+from twin.programs.sinumerik.polar import polar_target
+from twin.programs.sinumerik.spindle import follow_surface_speed, turn
+from twin.programs.sinumerik.state import State
+from twin.programs.sinumerik.words import Given, Words
+
+Z: Final = 2
+REACH_MM: Final = 1e-6
+
+
+def named_axes(state: State, words: Words) -> list[int]:
+    """Axes that the block names, by index."""
+    return [at for at, axis in enumerate(state.axes) if axis.upper() in words.values]
+
+
+def axis_value(state: State, axis: int, given: Given, now: float) -> float:
+    """Where an axis word goes, in program coordinates: G90 and G91, AC() and IC(), and for rotary axes DC(), ACP(), ACN()."""
+    value = given.number
+    rotary = axis > Z
+    if not rotary:
+        value *= state.unit_mm
+    mode = given.mode or ("AC" if state.modal["distance"] == "G90" else "IC")
+    if mode == "IC":
+        return now + value
+    if mode == "AC":
+        return value
+    if not rotary:
+        raise RefusedError(given.text, f"{mode} is for rotary axes; write AC or IC")
+    way = (value - now) % 360.0
+    if mode == "ACN":
+        way -= 360.0 if way else 0.0
+    elif mode == "DC" and way > 180.0:
+        way -= 360.0
+    return now + way
+
+
+def target(state: State, words: Words) -> Position:
+    """Machine position that the block asks for; an axis that is not named stays."""
+    if state.axes[Z].upper() in words.values:
+        state.take_length()
+    program = list(state.frames.to_program(state.position))
+    if "AP" in words.values or "RP" in words.values:
+        first, second, _ = PLANES[state.plane]
+        program[first], program[second] = polar_target(state, words, (program[first], program[second]))
+    for axis in named_axes(state, words):
+        program[axis] = axis_value(state, axis, words.values[state.axes[axis].upper()], program[axis])
+    return state.checked(state.frames.to_machine(tuple(program)))
+
+
+def distance(start: Position, end: Position) -> float:
+    """Length of a straight move over x, y, z; of a move of rotary axes alone, its degrees."""
+    return math.dist(start[:3], end[:3]) or math.dist(start, end)
+
+
+def add(state: State, move: Motion) -> None:
+    """Put out a motion, and take the position on."""
+    state.checked(move.end_mm)
+    if state.corner is not None:
+        move = corners.close(state, move)
+    start = state.position
+    keep_tangent(state, start, move)
+    put = compensation.note(state, move) if state.compensation is not None else move
+    state.emit(put)
+    state.position = move.end_mm
+    if state.compensation is not None:
+        compensation.after_move(state, start)
+
+
+def keep_tangent(state: State, start: Position, move: Motion) -> None:
+    """Remember the direction in which the motion ends in the plane, for CT."""
+    if isinstance(move, Arc) and move.plane != state.plane:
+        state.tangent = None
+        return
+    side = piece(start, move, state.plane)
+    if extent(side) > REACH_MM:
+        state.tangent = tangent(side, side.end)
+
+
+def linear(state: State, end: Position) -> None:
+    """Cut straight to a machine position."""
+    feed, per_rev = state.feed(distance(state.position, end))
+    add(state, Linear(state.line, end, feed, per_rev, state.program))
+
+
+def rapid(state: State, end: Position) -> None:
+    """Go to a machine position in rapid."""
+    add(state, Rapid(state.line, end, state.program))
+
+
+def move(state: State, words: Words) -> None:
+    """The motion of a block in the mode in force."""
+    mode = state.modal["motion"]
+    single = "exact" in words.codes and state.modal["path"] != "G60"
+    corner = corners.wanted(state, words)
+    if angled(state, words):
+        return
+    start, end = state.position, target(state, words)
+    follow_surface_speed(state, end)
+    if single:
+        state.emit(ExactStop(state.line, True, state.program))
+    if mode == "G0":
+        rapid(state, end)
+    elif mode == "G1":
+        linear(state, end)
+    elif mode in ARC_CODES:
+        add(state, circles.arc(state, words, end))
+    else:
+        thread(state, words, end)
+    if single:
+        state.emit(ExactStop(state.line, False, state.program))
+    if corner is not None:
+        corners.begin(state, corner, start)
+
+
+def thread(state: State, words: Words, end: Position) -> None:
+    """G33, G331, G332: I, J or K is the lead along its axis, mm/rev; with G331 its sign is the hand of the thread."""
+    mode = state.modal["motion"]
+    given = [words.values[letter] for letter in "IJK" if letter in words.values]
+    if len(given) != 1 or given[0].number == 0.0:
+        raise RefusedError(mode, "needs the lead of the thread: one of I, J, K")
+    lead = given[0].number * state.unit_mm
+    if mode == "G33":
+        feed, per_rev = state.per_revolution(abs(lead))
+        add(state, Linear(state.line, end, feed, per_rev, state.program))
+        return
+    if state.rpm <= 0.0:
+        raise RefusedError(mode, "needs the speed of the spindle; write S")
+    direction = 1 if (lead > 0.0) == (mode == "G331") else -1
+    turn(state, direction)
+    add(state, Linear(state.line, end, abs(lead) * state.rpm, abs(lead), state.program))
+    turn(state, 0)
+
+
+def tap(state: State, words: Words) -> None:
+    """G63: one tapping move with a compensating chuck; F is what the program makes of lead and speed."""
+    end = target(state, words)
+    linear(state, end)
+
+
+def level(state: State, position: Position) -> tuple[float, float]:
+    """The place of a position in the plane."""
+    return in_plane(position, state.plane)
