@@ -4,7 +4,7 @@ A line of length L from p₀ to p₁ is p(s) = p₀ + (p₁ − p₀) s / L. An 
 second axis (u, v) is, with the fraction f = s / L, p_u = c_u + r(f) cos(φ₀ + θ f), p_v = c_v + r(f) sin(φ₀ + θ f); the axes
 outside the plane move with f (helix). r(f) goes linearly from the radius of the start to that of the end, which differ by the
 rounding of the program, so that the end is met exactly; L = √((r θ)² + h²) with the mean radius r and the helix height h.
-The planes are those of `twin.gcode.planes`. A sweep is positive counter-clockwise seen from the positive normal of its plane.
+The planes are those of `twin.programs.planes`. A sweep is positive counter-clockwise seen from the positive normal of its plane.
 """
 
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gcode import canonical
-from twin.gcode.planes import PLANES
 from twin.motion.geometry import Segments, curvature_at, points_at, tangents_at
+from twin.programs import canonical
+from twin.programs.planes import PLANES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -248,3 +248,5 @@ def _add(builder: _Builder, move: canonical.Move) -> None:
             builder.exact_stop = move.on
         case canonical.LookAhead():
             pass  # The planner looks ahead over the whole program in either state.
+        case canonical.Tolerance() | canonical.JerkLimit() | canonical.FeedForward():
+            pass

@@ -1,6 +1,6 @@
 """The simulated machine: a part program in, what the machine would record out.
 
-program → canonical moves (twin.gcode) → path, look-ahead, reference (twin.motion) → engagement (twin.engagement) → response
+program → canonical moves (twin.programs) → path, look-ahead, reference (twin.motion) → engagement (twin.engagement) → response
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
-from twin.gcode import Settings, interpret
 from twin.learned.standing import seconds_of
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
@@ -20,6 +19,7 @@ from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
+from twin.programs import Settings, interpret
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond
 
