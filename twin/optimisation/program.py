@@ -88,6 +88,9 @@ class Cuts:
         return len(self.line)
 
 
+NO_CUTS = Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Programmed:
     """A program on a machine. tools: those that it uses, with their numbers (0 = [tool])
@@ -147,11 +150,10 @@ def programmed(
     for line, executions in _executions(path).items():
         segments = np.concatenate([np.arange(*span) for span in executions])
         segments = segments[path.kind[segments] != Kind.RAPID]
-        found = (
-            _cuts_of_segments(path, rows, segments, headed)
-            if rows is not None
-            else _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
-        )
+        if rows is not None:
+            found = _cuts_of_segments(path, rows, segments, headed)
+        else:
+            found = _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
         one = FeedLine(
             line, executions, int(numbers[segments[0]]), float(path.feed_mm_min[segments[0]]), float(speeds[segments[0]]),
             float(path.length_mm[segments].sum()), found.cut_mm, (0, 0),
@@ -174,9 +176,8 @@ def programmed(
         groups.append(found.rows)
     if rows is not None and machine.stock is not None:
         lines = _with_spring_passes(lines, near, touching(path, machine.stock, sections, list(near.values())))
-    no_cuts = Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
     return _numbered(
-        Programmed(machine, text, words, path, tuple(lines), no_cuts, tuple(tools), tuple(notes), collisions), groups
+        Programmed(machine, text, words, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
     )
 
 
