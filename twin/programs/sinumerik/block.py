@@ -112,7 +112,9 @@ def part(reader: Reader) -> Part:
     if token.name in REFUSED_WORDS:
         raise RefusedError(token.text, REFUSED_WORDS[token.name])
     if token.name in FRAME_VARIABLES and reader.peek() in ("=", "[") and not is_frame_element(reader):
-        raise RefusedError(token.text, "frames in variables are not read; write TRANS, ROT, SCALE, MIRROR, or set the work offset")
+        raise RefusedError(
+            token.text, "frames in variables are not read; write TRANS, ROT, SCALE, MIRROR, or set the work offset"
+        )
     following = reader.peek()
     if following == "(":
         return Invocation(token.name, tuple(reader.arguments()), token.text)

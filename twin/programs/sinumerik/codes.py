@@ -33,7 +33,19 @@ PASSED_OVER: Final = frozenset(
     | {"COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF"}  # the compressor keeps to the tolerance that CTOL says
     | {"CUT2D", "CUT2DF", "CDON", "CDOF", "CDOF2"}  # radius compensation in the plane; its own look-ahead
     | {"DIAMOF", "FNORM", "UPATH", "SPATH", "WALIMON", "WALIMOF", "RTLION", "RTLIOF", "DYNNORM", "DYNPOS", "DYNROUGH"}
-    | {"DYNSEMIFIN", "DYNFINISH", "DYNPREC", "FIFOCTRL", "STARTFIFO", "STOPFIFO", "STOPRE", "SBLON", "SBLOF", "DISPLON", "DISPLOF"}
+    | {
+        "DYNSEMIFIN",
+        "DYNFINISH",
+        "DYNPREC",
+        "FIFOCTRL",
+        "STARTFIFO",
+        "STOPFIFO",
+        "STOPRE",
+        "SBLON",
+        "SBLOF",
+        "DISPLON",
+        "DISPLOF",
+    }
     | {"GWPSOF", "TRAFOOF", "TCARRNONE", "SPCOF", "FTOCOF", "ROTOF", "TOROTOF", "PAROTOF", "CPRECOF", "CPRECON", "CFOF", "ORISOF"}
 )
 """Words with nothing to do here: displays, buffers, limits, dynamic data sets of the machine, switches that go to off."""

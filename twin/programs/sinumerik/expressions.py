@@ -122,7 +122,9 @@ class Reader:
         while (word := self.peek()) in PRIORITY and self.tokens[self.at].kind is Kind.OPERATOR and PRIORITY[word] >= lowest:
             if PRIORITY[word] == COMPARISON:
                 if compared:
-                    raise RefusedError(word, "the second comparison needs brackets, since AND and OR bind first: (R1==1) AND (R2==2)")
+                    raise RefusedError(
+                        word, "the second comparison needs brackets, since AND and OR bind first: (R1==1) AND (R2==2)"
+                    )
                 compared = True
             self.at += 1
             self.operators += 1
@@ -181,7 +183,9 @@ class Reader:
         return self.variable(token)
 
     def variable(self, token: Token) -> Variable:
-        """A name with its index, if any, once the name is passed."""
+        """A name with its index, if any, once the name is passed. `R5` is the parameter also before `=`."""
+        if token.name[0] == "R" and token.name[1:].isdecimal():
+            return Variable("R", (constant(float(token.name[1:])),), token.text)
         index: list[Expression] = []
         if self.taken("["):
             self.deeper()

@@ -5,8 +5,7 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-from twin.programs.sinumerik.expressions import Expression
-from twin.programs.sinumerik.functions import Value, as_number, as_text, as_whole, is_true
+from twin.programs.sinumerik.functions import Value, as_text, as_whole, is_true
 from twin.programs.sinumerik.syntax import (
     Assignment,
     Case,
@@ -14,12 +13,10 @@ from twin.programs.sinumerik.syntax import (
     Invocation,
     Jumps,
     Name,
-    Procedure,
     Repeat,
-    Structure,
     Target,
 )
-from twin.programs.sinumerik.text import Section, Text, program_name
+from twin.programs.sinumerik.text import Section, Text
 from twin.programs.sinumerik.variables import Cell, Variables
 
 SKIPPED_NAME_MAX: Final = 40
@@ -39,7 +36,8 @@ class Region:
 class Level:
     """A running program: where it is, what it repeats, its variables, and what its end hands back.
 
-    references: for each VAR parameter its name, and the caller's variable; saved: what SAVE restores
+    given, sources: values of the call, and the variables of the caller that they come from; handed_back: names of VAR parameters
+    with their places; is_bound: PROC was read, or passed; saved: what SAVE restores
     """
 
     text: Text
@@ -47,8 +45,10 @@ class Level:
     at: int
     local: dict[str, Cell] = field(default_factory=dict)
     repeats_left: int = 0
-    given: tuple[Value | None, ...] | None = None
-    references: list[tuple[str, str, tuple[Value, ...]]] = field(default_factory=list)
+    given: tuple[Value | None, ...] = ()
+    sources: tuple[tuple[str, tuple[Value, ...]] | None, ...] = ()
+    handed_back: list[tuple[str, int]] = field(default_factory=list)
+    is_bound: bool = False
     regions: list[Region] = field(default_factory=list)
     is_modal: bool = False
     saves: bool = False
@@ -143,56 +143,6 @@ class Flow:
         else:
             self.jump(statement.otherwise)
 
-    def structure(self, statement: Structure) -> None:
-        """Run a line of IF, LOOP, FOR, WHILE or REPEAT."""
-        level, word = self.level, statement.word
-        span = level.text.span(level.section, level.at)
-        holds = statement.condition is None or is_true(statement.condition(self.variables), word)
-        if word in ("ENDLOOP", "ENDWHILE", "ENDFOR") or (word == "UNTIL" and not holds):
-            self.count()
-        if word == "IF":
-            past = span.end if span.middle is None else span.middle
-            level.at = level.at + 1 if holds else past + 1
-        elif word == "ELSE":
-            level.at = span.end + 1
-        elif word == "FOR":
-            self.counts(statement, is_first=True)
-            level.at = level.at + 1 if self.counts_on(statement) else span.end + 1
-        elif word == "ENDFOR":
-            head = self.head_of(span.begin)
-            self.counts(head, is_first=False)
-            level.at = span.begin + 1 if self.counts_on(head) else span.end + 1
-        elif word == "WHILE":
-            level.at = level.at + 1 if holds else span.end + 1
-        elif word in ("ENDLOOP", "ENDWHILE"):
-            level.at = span.begin
-        elif word == "UNTIL":
-            level.at = level.at + 1 if holds else span.begin + 1
-        else:
-            level.at += 1
-
-    def head_of(self, line: int) -> Structure:
-        block = self.level.text.blocks.get(line)
-        if block is None or not isinstance(block.statement, Structure):
-            raise RefusedError("ENDFOR", "is reached without its FOR")
-        return block.statement
-
-    def counts(self, statement: Structure, is_first: bool) -> None:
-        """Set the counter of FOR, or take it one on."""
-        counter = statement.counter
-        assert counter is not None and statement.first is not None
-        at = counter.at(self.variables)
-        if is_first:
-            self.variables.write(counter.name, at, statement.first(self.variables), counter.text)
-        else:
-            now = as_number(self.variables.read(counter.name, at, counter.text), counter.text)
-            self.variables.write(counter.name, at, now + 1.0, counter.text)
-
-    def counts_on(self, statement: Structure) -> bool:
-        assert statement.counter is not None and statement.last is not None
-        last = as_number(statement.last(self.variables), "TO")
-        return as_number(statement.counter(self.variables), statement.counter.text) <= last
-
     def repeat(self, statement: Repeat) -> None:
         """REPEAT, REPEATB: run blocks again, then go on behind this one."""
         level, times = self.level, 1
@@ -246,86 +196,3 @@ class Flow:
             variables.fill(target.name, at, values, statement.is_repeated or everywhere, target.text)
         else:
             variables.write(target.name, at, values[0], target.text)
-
-    def find(self, name: str) -> tuple[Text, Section] | None:
-        """The program of a name: in the running text, in the main text, or in a text of its own."""
-        for text in (self.level.text, self.levels[0].text):
-            if name in text.programs:
-                return text, text.programs[name]
-        if name not in self.texts:
-            given = next((text for key, text in self.settings.programs.items() if program_name(key) == name), None)
-            if given is None:
-                return None
-            self.texts[name] = Text(given, name)
-        text = self.texts[name]
-        return text, text.programs.get(name, text.sections[0])
-
-    def call(
-        self,
-        name: str,
-        word: str,
-        arguments: tuple[Expression | None, ...] = (),
-        repeats: int = 1,
-        is_modal: bool = False,
-    ) -> None:
-        """Begin a subprogram; the caller goes on behind its block."""
-        found = self.find(name)
-        if found is None:
-            raise RefusedError(word, "there is no such subprogram, cycle or G code here; programs are handed in with the text")
-        if len(self.levels) > self.settings.call_depth_max:
-            raise RefusedError(word, f"calls are nested deeper than {self.settings.call_depth_max}; Settings.call_depth_max")
-        if not 0 <= repeats <= self.settings.repeats_max:
-            raise RefusedError("P", f"repeats from 0 to {self.settings.repeats_max} times")
-        self.count()
-        given = tuple(None if one is None else one(self.variables) for one in arguments)
-        text, section = found
-        level = Level(text, section, section.start, {}, repeats - 1, given, is_modal=is_modal)
-        for one in arguments:
-            variable = getattr(one, "name", None)
-            at = one.at(self.variables) if isinstance(variable, str) else ()  # type: ignore[union-attr]
-            level.references.append(("", variable or "", at))
-        if repeats > 0:
-            self.levels.append(level)
-            self.variables.local = level.local
-
-    def procedure(self, statement: Procedure) -> None:
-        """PROC: its parameters become variables with the values of the call."""
-        level = self.level
-        given = level.given or ()
-        if len(given) > len(statement.parameters):
-            raise RefusedError(statement.name, f"takes {len(statement.parameters)} arguments, and the call has {len(given)}")
-        references = level.references
-        level.references = []
-        for place, one in enumerate(statement.parameters):
-            sizes = tuple(size(self.variables) for size in one.sizes)
-            self.variables.define(one.kind, one.name, sizes, one.text)
-            value = given[place] if place < len(given) else None
-            if value is not None:
-                self.variables.write(one.name, (), value, one.text)
-            elif one.first is not None:
-                self.assign(one.first)
-            if one.by_reference and place < len(references):
-                if not references[place][1]:
-                    raise RefusedError(one.text, "is VAR, and hands its value back: the call needs a variable there")
-                level.references.append((one.name, references[place][1], references[place][2]))
-        level.given = ()
-        level.saves = statement.saves
-
-    def returns(self) -> bool:
-        """End the running program; False where it is the main program."""
-        if len(self.levels) == 1:
-            return False
-        level = self.level
-        if level.repeats_left > 0:
-            self.count()
-            level.repeats_left -= 1
-            level.at = level.section.start
-            level.local.clear()
-            level.regions.clear()
-            return True
-        self.levels.pop()
-        back = [(name, at, level.local[own].values[0]) for own, name, at in level.references if own in level.local]
-        self.variables.local = self.level.local
-        for name, at, value in back:
-            self.variables.write(name, at, value, name)
-        return True

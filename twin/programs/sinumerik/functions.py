@@ -149,8 +149,6 @@ REAL_FUNCTIONS: Final[Mapping[str, tuple[int, Callable[..., float]]]] = {
 """Number of arguments, and the function."""
 
 
-
-
 TEXT_FUNCTIONS: Final[Mapping[str, tuple[int, Callable[..., Value]]]] = {
     "STRLEN": (1, lambda text: float(len(as_text(text)))),
     "NUMBER": (1, lambda text: text_number(as_text(text))),

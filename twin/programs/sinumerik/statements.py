@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.expressions import Expression, Reader, Variable
+from twin.programs.sinumerik.expressions import Expression, Reader, Variable, constant
 from twin.programs.sinumerik.syntax import (
     Assignment,
     CallByName,
@@ -119,15 +119,15 @@ def repeat(reader: Reader) -> Statement:
             raise RefusedError(word, "needs the label of the block to repeat")
         return Structure("REPEAT")
     begin = reader.name("a label")
-    end, times = "", None
+    end = ""
+    times: Expression | None = None
     if not reader.done and reader.tokens[reader.at].kind is Kind.NAME and reader.peek() != "P":
         end = reader.name("a label")
     if not reader.done:
         token = reader.token()
         if token.kind is Kind.ADDRESS and token.name == "P":
             reader.at += 1
-            number = token.number
-            times = lambda store: number  # noqa: E731
+            times = constant(token.number)
         else:
             reader.take("P")
             reader.take("=")
@@ -160,6 +160,8 @@ def type_name(reader: Reader) -> str:
 def declaration(reader: Reader, kind: str, by_reference: bool = False) -> Declared:
     token = reader.token()
     name = reader.name("the name of a variable")
+    if len(name) < 2 or name[1].isdigit():
+        raise RefusedError(token.text, "the name of a variable begins with two letters; one letter is an address")
     found = reader.variable(token)
     first = None
     if reader.taken("="):

@@ -8,7 +8,27 @@ from twin.programs.sinumerik.expressions import Expression, Variable
 BLOCK_ADDRESSES: Final = frozenset(
     {"CR", "AR", "AP", "RP", "TURN", "CHF", "CHR", "RND", "RNDM", "FRC", "FRCM", "ANG", "ANG1", "ANG2", "SPOS", "SPOSA", "ADIS"}
     | {"ADISPOS", "CTOL", "OTOL", "STOLF", "OFFN", "DISC", "RPL", "LIMS", "SF", "DITS", "DITE", "VELOLIM", "ACC", "OVR", "OVRRAP"}
-    | {"I1", "J1", "K1", "FL", "FZ", "FB", "SCC", "POS", "POSA", "FA", "PO", "PL", "PW", "SD", "BNAT", "ENAT", "SVC", "DL", "VELOLIMA"}
+    | {
+        "I1",
+        "J1",
+        "K1",
+        "FL",
+        "FZ",
+        "FB",
+        "SCC",
+        "POS",
+        "POSA",
+        "FA",
+        "PO",
+        "PL",
+        "PW",
+        "SD",
+        "BNAT",
+        "ENAT",
+        "SVC",
+        "DL",
+        "VELOLIMA",
+    }
     | {"DISR", "DISCL", "FAD", "A2", "B2", "C2", "A3", "B3", "C3", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT", "THETA"}
 )
 """Addresses of more than one letter; any other name with `=` behind it is a variable."""

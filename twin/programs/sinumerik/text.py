@@ -10,7 +10,7 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.syntax import Block
 from twin.programs.sinumerik.tokens import CAPITALS
 
-HEADER: Final = re.compile(r"[ \t]*+%[ \t]*+(?:_N_)?+([A-Z0-9_]++?)(?:_(MPF|SPF|CYC))?[ \t]*+(?:;.*+)?+")
+HEADER: Final = re.compile(r"[ \t]*+%[ \t]*+([A-Z0-9_]++)?+")
 HEAD: Final = re.compile(
     r"[ \t]*+(?:/[0-9]?+[ \t]*+)?+(?:[N:][ \t]*+([0-9]++)[ \t]*+)?+(?:([A-Z_][A-Z_][A-Z0-9_]*+)[ \t]*+:(?!=)[ \t]*+)?+([A-Z]++)?+"
 )
@@ -84,7 +84,9 @@ class Text:
         if line not in spans:
             found = HEAD.match(self.lines[line])
             word = found[3] or "" if found is not None else ""
-            raise RefusedError(word, "this structure is not whole: IF ENDIF, LOOP ENDLOOP, FOR ENDFOR, WHILE ENDWHILE, REPEAT UNTIL")
+            raise RefusedError(
+                word, "this structure is not whole: IF ENDIF, LOOP ENDLOOP, FOR ENDFOR, WHILE ENDWHILE, REPEAT UNTIL"
+            )
         return spans[line]
 
 
@@ -95,10 +97,10 @@ def sections(lines: list[str]) -> list[Section]:
     for at, line in enumerate(lines):
         stripped = line.lstrip()
         if stripped.startswith("%"):
-            header = HEADER.fullmatch(line)
+            header = HEADER.match(line)
             if used:
                 found.append(Section(name, start, at))
-            name, start, used = (header[1] if header is not None else ""), at + 1, False
+            name, start, used = program_name(header[1] or "") if header is not None else "", at + 1, False
         elif stripped and not stripped.startswith(";"):
             used = True
     found.append(Section(name, start, len(lines)))
