@@ -77,7 +77,7 @@ def note(state: State, move: Motion) -> Motion:
 def contour_feed(state: State, move: Arc, left: float) -> Arc:
     """CFC: the feed holds at the contour; CFIN: where the centre's arc is the smaller one only; CFTCP: at the centre."""
     mode = state.modal["contour_feed"]
-    radius = math.dist(in_plane(state.position, move.plane), in_plane(move.centre_mm, move.plane))
+    radius = math.dist(in_plane(move.end_mm, move.plane), in_plane(move.centre_mm, move.plane))
     ratio = (radius - math.copysign(left, left * move.sweep_rad)) / radius if radius > 0.0 else 1.0
     if mode == "CFTCP" or ratio <= 0.0 or (mode == "CFIN" and ratio > 1.0):
         return move

@@ -13,6 +13,7 @@ from twin.programs.pieces import piece, placed, rebuilt, rounded, straight
 from twin.programs.planar import extent, trimmed, turn_between
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.codes import CONTOUR_CODES
+from twin.programs.sinumerik.compensation import note
 from twin.programs.sinumerik.state import PendingCorner, State
 from twin.programs.sinumerik.words import Words
 
@@ -134,7 +135,6 @@ def insert(state: State, at: int, move: Motion) -> None:
     later = state.out[at:]
     del state.out[at:]
     if state.compensation is not None:
-        section = state.compensation.section
-        section.offsets_mm[len(section.moves)] = None if state.compensation.leaving else state.compensation.left
+        move = note(state, move)
     state.out.append(move)
     state.out.extend(later)
