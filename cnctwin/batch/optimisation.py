@@ -76,7 +76,7 @@ def optimise_request(
     checkpoint: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Optimised:
-    """The answer to a request: optimised.nc (or with the program's own ending), optimisation.json, report.html in the folder `out`.
+    """The answer to a request: optimised.nc (or with the program's own ending), optimisation.json, report.html in folder `out`.
 
     checkpoint: written after every epoch, and gone on with where it is there
 
