@@ -4,9 +4,9 @@ The corner rule is that of FANUC's AI contour control (A-63512EN; permissible sp
 tangents t⁻, t⁺ before and after a corner, the speed there is v ≤ min over axes of D_i / |t⁺_i − t⁻_i|. The other rule that
 controls use is by contour tolerance (junction deviation δ): with γ the angle between the two lines, v² ≤ a δ sin(γ/2) / (1 −
 sin(γ/2)). The circle that touches both lines and leaves the corner by δ has the radius r = δ sin(γ/2) / (1 − sin(γ/2)), and
-v² / r is the acceleration along the path there (S. K. Jeon, *Improving Grbl: cornering algorithm*, 2011). Where the program itself
-states a tolerance (HEIDENHAIN cycle 32, SINUMERIK CYCLE832), this rule with that tolerance alone decides. A limit that is infinite
-does not exist.
+v² / r is the acceleration along the path there (S. K. Jeon, *Improving Grbl: cornering algorithm*, 2011). Where the program
+itself states a tolerance (HEIDENHAIN cycle 32, SINUMERIK CYCLE832), this rule with that tolerance alone decides. A limit that is
+infinite does not exist.
 """
 
 from dataclasses import dataclass, replace

@@ -100,7 +100,8 @@ class Settings:
     block_skip: numbers of the block-skip switches that are on; a bare `/` is number 1 (FANUC), 0 (SINUMERIK)
     optional_stop: M1 stops
     subprograms: texts by O number; one that stands in the main text goes first
-    programs: texts of other programs by the name that calls them (CALL PGM, a SINUMERIK subprogram), without folder and suffix
+    programs: texts of other programs by their names without folder and suffix, in small letters: what CALL PGM and the call of a
+        SINUMERIK subprogram name (`called_text`)
     parameters: values of parameters before the start, by name: "Q1", "QL1", "QR1" (HEIDENHAIN), "R10" (SINUMERIK)
     tool_numbers: numbers of tools by their names, where a program calls a tool by name
     variables: values of # variables before the start, also of system variables that a twin cannot know (#3011 …)
@@ -165,3 +166,12 @@ class Settings:
         for name in self.parameters:
             if not PARAMETER_NAME.fullmatch(name):
                 raise TwinError(f"parameter {name!r} is not known; names are such as Q1, QL1, QR1 (HEIDENHAIN), R10 (SINUMERIK)")
+
+    def called_text(self, name: str) -> str | None:
+        """Return the text of a program by the name that calls it, with folder and suffix or without; None = it is not there.
+
+        >>> Settings(programs={"pocket": "M30"}).called_text("TNC:\\NC\\POCKET.H")
+        'M30'
+        """
+        bare = re.split(r"[/\\]", name)[-1].casefold()
+        return self.programs.get(bare, self.programs.get(bare.rpartition(".")[0]))
