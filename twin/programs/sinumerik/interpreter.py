@@ -1,13 +1,17 @@
 """The interpreter: a SINUMERIK part program in, canonical moves out."""
 
+from typing import Final
+
 from twin.errors import PartProgramError
 from twin.programs.canonical import Move, ProgramEnd
+from twin.programs.plain import PLAIN, PlainModes, plain_blocks
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-from twin.programs.sinumerik import calls, compensation, corners, modes, smoothing
+from twin.programs.sinumerik import calls, compensation, corners, modes, motion, smoothing
 from twin.programs.sinumerik.block import parse
 from twin.programs.sinumerik.cycles.catalogue import CYCLES, REFUSED_CYCLES, run_cycle
 from twin.programs.sinumerik.flow import Flow
+from twin.programs.sinumerik.frames import IDENTITY
 from twin.programs.sinumerik.functions import as_text
 from twin.programs.sinumerik.state import State
 from twin.programs.sinumerik.structures import structure
@@ -31,7 +35,8 @@ from twin.programs.sinumerik.text import Text, program_name
 from twin.programs.sinumerik.variables import Variables
 from twin.programs.sinumerik.words import evaluated
 
-ENDS = frozenset({2, 30})
+ENDS: Final = frozenset({2, 30})
+PLAIN_MOTIONS: Final = ("G0", "G1", "G2", "G3")
 
 
 class Interpreter:
@@ -54,12 +59,63 @@ class Interpreter:
                 level = self.flow.level
                 if self.flow.end_of_region():
                     continue
+                if self.is_plain():
+                    self.plain_blocks()
                 running = self.block() if level.at < level.section.stop else self.returns()
             self.finish()
         except RefusedError as refused:
             line, program = refused.place or (self.state.line, self.state.program)
             raise PartProgramError(line + 1, refused.word, refused.reason, program) from None
         return self.state.moves
+
+    def is_plain(self) -> bool:
+        """Return True where the modes allow the short way."""
+        state, flow = self.state, self.flow
+        modal = state.modal
+        return (
+            flow.modal is None
+            and not flow.level.regions
+            and (flow.level.is_bound or not flow.level.given)
+            and modal["motion"] in PLAIN_MOTIONS
+            and modal["feed"] == "G94"
+            and modal["plane"] == "G17"
+            and state.compensation is None
+            and state.corner is None
+            and state.pending_angle is None
+            and state.rounding_mm == 0.0
+            and not state.length_is_due
+            and len(state.axes) == 3
+            and state.frames.program.matrix == IDENTITY
+        )
+
+    def plain_blocks(self) -> None:
+        """Run plain motions up to the first block that is none. Leaves its line in `level.at`."""
+        level, state, frames = self.flow.level, self.state, self.state.frames
+        x, y, z = state.position
+        now = PlainModes(
+            PLAIN_MOTIONS.index(state.modal["motion"]),
+            state.modal["distance"] == "G90",
+            (x, y, z),
+            frames.to_machine((0.0, 0.0, 0.0)),
+            state.feed_word,
+            state.unit_mm,
+            state.feed_unit_mm,
+            self.settings.arc_radius_error_mm_max,
+        )
+        text, start, put = level.text, level.at, len(state.moves)
+        at = plain_blocks(text.lines, start, level.section.stop, text.name, PLAIN.fullmatch, now, state.moves.append)
+        if at > start:
+            level.at, state.modal["motion"] = at, PLAIN_MOTIONS[now.motion]
+            state.feed_word, state.position = now.feed_mm_min, now.position
+            motion.keep_tangents(state, (x, y, z), state.moves[put:])
+            self.count(at - start)
+
+    def count(self, blocks: int) -> None:
+        self.blocks_run += blocks
+        if self.blocks_run > self.settings.blocks_max:
+            raise RefusedError("", f"more than {self.settings.blocks_max} blocks were run; Settings.blocks_max")
+        if len(self.state.moves) > self.settings.moves_max:
+            raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
 
     def finish(self) -> None:
         """What is still open at the end of the program."""
@@ -90,9 +146,7 @@ class Interpreter:
         level, state = self.flow.level, self.state
         at, text = level.at, level.text
         state.line, state.program = at, text.name
-        self.blocks_run += 1
-        if self.blocks_run > self.settings.blocks_max:
-            raise RefusedError("", f"more than {self.settings.blocks_max} blocks were run; Settings.blocks_max")
+        self.count(1)
         block = text.blocks.get(at)
         if block is None:
             block = text.blocks[at] = parse(text.lines[at], text.written[at], self.settings)

@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from twin.programs.canonical import Arc, Linear, Motion, Position, Rapid
+from twin.programs.canonical import Arc, Linear, Motion, Move, Position, Rapid
 from twin.programs.pieces import piece
 from twin.programs.planar import extent, tangent
 from twin.programs.planes import PLANES
@@ -83,6 +83,16 @@ def keep_tangent(state: State, start: Position, move: Motion) -> None:
     side = piece(start, move, state.plane)
     if extent(side) > REACH_MM:
         state.tangent = tangent(side, side.end)
+
+
+def keep_tangents(state: State, start: Position, moves: list[Move]) -> None:
+    """The same after several motions: the last that goes anywhere in the plane counts."""
+    for at in range(len(moves) - 1, -1, -1):
+        move = moves[at]
+        before = getattr(moves[at - 1], "end_mm", start) if at else start
+        if isinstance(move, Rapid | Linear | Arc) and extent(piece(before, move, state.plane)) > REACH_MM:
+            keep_tangent(state, before, move)
+            return
 
 
 def linear(state: State, end: Position) -> None:
