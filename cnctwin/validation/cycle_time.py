@@ -20,10 +20,10 @@ from twin.case import RunAtHand, RunEntry, RunKind
 from twin.errors import TwinError
 from twin.gap.programs.fit import REFERENCE_START_MM, Model, Watched
 from twin.gap.programs.trial import Trial, trial_of
-from twin.gcode import Settings, interpret
 from twin.motion.control import program_effects
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
+from twin.programs import Settings, interpret
 from twin.recording.program_run import OVERRIDES
 from twin.runlog import RunLog
 

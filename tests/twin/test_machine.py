@@ -8,9 +8,9 @@ from tests.twin.axes import AXIS
 from twin.case import read_case
 from twin.effects.added import check_effects
 from twin.errors import CaseError, MachineError
-from twin.gcode import IntegerWords, Settings, ToolOffset
 from twin.machine import machine_from_toml, read_machine
 from twin.machine_toml import machine_to_toml
+from twin.programs import IntegerWords, Settings, ToolOffset
 
 HEAD = "[machine]\nname = 'a'\n"
 WHOLE = (
@@ -126,7 +126,7 @@ tool_offsets = { 7 = { length_mm = 100.0, length_wear_mm = -0.1 } }
         tool_offsets={7: ToolOffset(length_mm=100.0, length_wear_mm=-0.1)},
     )
     assert machine_from_toml(machine_to_toml(machine)) == machine
-    without = {"axes", "subprograms"} | {name for name in Settings.__dataclass_fields__ if name.endswith("s_max")}
+    without = {"axes", "programs", "subprograms"} | {name for name in Settings.__dataclass_fields__ if name.endswith("s_max")}
     without |= {"call_depth_max", "bracket_depth_max"}
     assert set(type(machine.control).model_fields) == set(Settings.__dataclass_fields__) - without
 

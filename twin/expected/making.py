@@ -27,13 +27,13 @@ from twin.expected.forces import row_forces
 from twin.expected.lines import Numbering, numbering_of, numbers
 from twin.expected.meter import Meter
 from twin.expected.stretches import stretches_of
-from twin.gcode import Settings, interpret
 from twin.live.spindle import LiveSpindle
 from twin.machine import MachineFile, Tool
 from twin.motion.path import Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.optimisation.program import END_FACE_MM2
-from twin.optimisation.words import source_lines
+from twin.programs import Settings, interpret
+from twin.programs.source import source_lines
 from twin.simulator.simulation import program_plan, program_settings
 
 Floats = NDArray[np.float64]

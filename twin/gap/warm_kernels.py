@@ -11,11 +11,11 @@ import numpy as np
 from twin.effects.catalogue import catalogue
 from twin.effects.effect import Effect, On
 from twin.gap.stages.cut import acting
-from twin.gcode import interpret
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.machine import Program, SpindleDrive, Thermal
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
+from twin.programs import interpret
 from twin.sensor.reading import readings
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 

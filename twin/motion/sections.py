@@ -1,10 +1,10 @@
 """The sections of a program between its tool changes, and how long the twin says that each takes."""
 
 from twin.errors import MachineError
-from twin.gcode import interpret
 from twin.machine import MachineFile
 from twin.motion.control import control_of
 from twin.motion.path import EventKind, path_from_moves
+from twin.programs import interpret
 
 
 def section_seconds(machine: MachineFile, text: str) -> tuple[float, ...]:

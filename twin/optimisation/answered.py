@@ -20,7 +20,7 @@ from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, s
 from twin.optimisation.speeds.notes import speed_notes
 from twin.optimisation.speeds.stretches import changes_in_material
 from twin.optimisation.uncertainty import PRICED, sensitivity
-from twin.optimisation.words import source_lines
+from twin.programs.source import source_lines
 
 
 def answered(

@@ -18,13 +18,13 @@ from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
 from twin.gap.stages.free import effect_parameters
-from twin.gcode import Settings, interpret
 from twin.learned.standing import moved_by
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
 from twin.motion.plan import Plan, plan
 from twin.motion.sampling import sampled
+from twin.programs import Settings, interpret
 from twin.runlog import AXIS_COLUMN
 from twin.simulator.response import RunInput, respond
 from twin.simulator.simulation import IDEAL_TIMES

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.errors import PartProgramError, TwinError
-from twin.gcode import Settings, interpret
 from twin.motion.limits import stops
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.programs import Settings, interpret
 from twin.recording.program_run import OVERRIDES, Ending, Pause, ProgramRun
 from twin.recording.recorded_program import NOMINAL, RecordedProgram
 from twin.recording.visits import by_visit

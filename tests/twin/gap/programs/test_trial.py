@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tests.recordings import recording
 from tests.twin.gap.programs.written import PERIOD_S, case_of, made, plate_runs, shop_program, whole_program
 from twin.gap.programs.trial import Refused, Trial, section_feed_ratios, trial_of
-from twin.gcode import Settings
+from twin.programs import Settings
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import run_log
