@@ -4,14 +4,15 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from twin.programs.arcs import Point
+from twin.programs.canonical import Linear, Motion
 from twin.programs.klartext import compensation, m_functions, motion
 from twin.programs.klartext.approach import depart
 from twin.programs.klartext.block import Block, parse
 from twin.programs.klartext.source import Source
 from twin.programs.klartext.state import Approach, State
-from twin.programs.pieces import in_plane
-from twin.programs.planar import Point, tangent
-from twin.programs.pieces import piece
+from twin.programs.pieces import in_plane, piece
+from twin.programs.planar import tangent
 from twin.programs.refusal import RefusedError
 
 SHAPES: Final = frozenset({"LEN", "CCA", "R"})
@@ -56,25 +57,20 @@ def approach(state: State, block: Block, kind: str, polar: bool) -> None:
     if side == 0 and kind != "LT":
         raise RefusedError("R0", f"APPR {kind} needs the side of the tool; write RL or RR")
     m_functions.before(state, block.m)
-    # P_H of LT, LN and CT is reached as the last block moved; LCT goes all the way with its own feed.
-    before = state.last_rapid
-    start_feed = None if before or kind == "LCT" else state.feed()
+    # P_H of LT, LN and CT is reached as the block before moved; LCT goes all the way with its own feed.
+    start_rapid, start_feed = state.last_rapid, (0.0, None) if state.last_rapid or kind == "LCT" else state.feed()
     rapid = motion.take_feed(state, block)
     end = motion.polar_target(state, block)[0] if polar else motion.target(state, block)
     here = list(end)
     here[state.normal] = state.position[state.normal]
     depth = end[state.normal] if end[state.normal] != here[state.normal] else None
-    first = rest = motion.straight_move(state, end, rapid)
+    rest = motion.straight_move(state, end, rapid)
+    first: Motion = rest
     if kind != "LCT":
-        if start_feed is None:
-            first = motion.straight_move(state, end, rapid=True)
-        else:
-            first = first._replace(feed_mm_min=start_feed[0], feed_per_rev_mm=start_feed[1]) if not rapid else first
+        own = Linear(state.line, end, *start_feed, state.program)
+        first = motion.straight_move(state, end, rapid=True) if start_rapid else own
     size, angle = figures(state, block, kind, "APPR")
-    if side:
-        compensation.begin(state, side, word)
-    else:
-        compensation.begin(state, 0, "APPR")
+    compensation.begin(state, side, word if side else "APPR")
     mirrored = -1 if state.frame.mirrors(state.plane) else 1
     state.approach = Approach(kind, side * mirrored, size, angle, depth, first, rest)
     motion.add(state, rest)
@@ -90,7 +86,7 @@ def departure(state: State, block: Block, kind: str, polar: bool) -> None:
     m_functions.before(state, block.m)
     rapid = motion.take_feed(state, block)
     side = state.side * (-1 if state.frame.mirrors(state.plane) else 1)
-    at, direction = left_contour(state)
+    direction = left_contour(state)
     if side == 0 and kind != "LT":
         raise RefusedError("DEP", f"DEP {kind} needs the side of the tool, RL or RR, before")
     goal: Point | None = None
@@ -110,12 +106,12 @@ def departure(state: State, block: Block, kind: str, polar: bool) -> None:
     m_functions.after(state, block.m)
 
 
-def left_contour(state: State) -> tuple[Point, Point]:
-    """Where the tool leaves the contour, and its direction there."""
-    found = compensation.finish(state) if state.compensation is not None else None
+def left_contour(state: State) -> Point:
+    """The direction in which the tool leaves the contour, which ends here."""
+    found = compensation.finish(state)
     if found is not None:
         return found
     if state.last is None:
         raise RefusedError("DEP", "needs a contour before it")
     programmed = piece(state.last[0], state.last[1], state.plane)
-    return programmed.end, tangent(programmed, programmed.end)
+    return tangent(programmed, programmed.end)

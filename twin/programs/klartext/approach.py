@@ -1,9 +1,9 @@
 """The ways on and off a contour that APPR and DEP draw, on the path of the tool's centre.
 
-P_S start, P_H auxiliary point, P_A first and P_E last point of the contour, P_N end. LT: straight, along the contour. LN: straight
-and square to it, on the tool's side. CT: an arc that touches it. LCT: the same, and a straight line that touches the arc. An arc
-of RL turns counter-clockwise, of RR clockwise; a negative R turns it over (User's Manual TNC7 81762x-16, "Approach function APPR
-CT"). The way to P_H is in the plane first, then along the tool's axis (User's Manual TNC 640 34059x-02, page 199).
+P_S start, P_H auxiliary point, P_A first and P_E last point of the contour, P_N end. LT: straight, along the contour. LN:
+straight and square to it, on the tool's side. CT: an arc that touches it. LCT: the same, and a straight line that touches the
+arc. An arc of RL turns counter-clockwise, of RR clockwise; a negative R turns it over (User's Manual TNC7 81762x-16, "Approach
+function APPR CT"). The way to P_H is in the plane first, then along the tool's axis (User's Manual TNC 640 34059x-02, page 199).
 """
 
 import math
@@ -61,7 +61,9 @@ def auxiliary(way: Approach, start: Point, end: Point, direction: Point) -> tupl
         return turned(end, centre, -sense * way.angle_rad), centre, sense * way.angle_rad
     found = touching(centre, radius, sense, start, arrives=True)
     if found is None:
-        raise RefusedError("APPR", f"no line from the starting point touches this arc of {radius:g} mm; start further away", place(way))
+        raise RefusedError(
+            "APPR", f"no line from the starting point touches this arc of {radius:g} mm; start further away", place(way)
+        )
     return found, centre, swept(centre, found, end, sense)
 
 
@@ -96,9 +98,7 @@ def go(out: list[Move], like: Motion, here: Position, end: Position) -> Position
     return end
 
 
-def along_arc(
-    out: list[Move], like: Motion, here: Position, end: Position, centre: Point, plane: int, sweep: float
-) -> Position:
+def along_arc(out: list[Move], like: Motion, here: Position, end: Position, centre: Point, plane: int, sweep: float) -> Position:
     if sweep == 0.0:
         return go(out, like, here, end)
     if isinstance(like, Rapid):
@@ -127,7 +127,9 @@ def depart(out: list[Move], way: Approach, position: Position, direction: Point,
         else:
             found = touching(centre, radius, sense, goal, arrives=False)
             if found is None:
-                raise RefusedError("DEP", f"no line to the end point touches this arc of {radius:g} mm; end further away", place(way))
+                raise RefusedError(
+                    "DEP", f"no line to the end point touches this arc of {radius:g} mm; end further away", place(way)
+                )
             off, sweep = found, swept(centre, start, found, sense)
         here = along_arc(out, way.rest, here, placed(here, off, plane), centre, plane, sweep)
         if goal is not None:

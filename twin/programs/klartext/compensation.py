@@ -6,12 +6,13 @@ corners it goes on an arc (User's Manual TNC 640, "Tool radius compensation").
 
 from itertools import pairwise
 
+from twin.programs.arcs import Point
 from twin.programs.canonical import Motion, Move, Position
 from twin.programs.cutter_path import REACH_MM, CompensatedSection, Side, collect, join, put_out
 from twin.programs.klartext.approach import draw
 from twin.programs.klartext.state import State
 from twin.programs.pieces import in_plane, piece, placed
-from twin.programs.planar import Point, extent, tangent
+from twin.programs.planar import extent, tangent
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import LeadIn, OutsideCorner
 
@@ -63,8 +64,8 @@ def note(state: State, leaves: bool) -> None:
     section.offsets_mm[len(section.moves)] = None if leaves else state.left_mm
 
 
-def finish(state: State) -> tuple[Point, Point] | None:
-    """Work out the section and put it out. Returns where the tool left the contour and its direction there, if it was on one."""
+def finish(state: State) -> Point | None:
+    """Work out the section and put it out. Returns the direction at the end of the contour, if there was one."""
     section, approach = state.compensation, state.approach
     if section is None:
         return None
@@ -74,7 +75,8 @@ def finish(state: State) -> tuple[Point, Point] | None:
     for first, second in pairwise(sides):
         join(first, second, first is sides[0], LeadIn.NEXT, OutsideCorner.ARC)
     if approach is not None and len(sides) < 2:
-        raise RefusedError("APPR", "needs a contour behind it, in the working plane")
+        place = (approach.first.line, approach.first.program)
+        raise RefusedError("APPR", "needs a contour behind it, in the working plane", place)
     position: Position = section.start_mm
     for move in before:
         state.moves.append(move)
@@ -90,9 +92,9 @@ def finish(state: State) -> tuple[Point, Point] | None:
     return leaving(sides)
 
 
-def leaving(sides: list[Side]) -> tuple[Point, Point] | None:
+def leaving(sides: list[Side]) -> Point | None:
     last = next((side for side in reversed(sides) if not side.leaves), None)
-    return None if last is None else (last.end, tangent(last.shifted, last.end))
+    return None if last is None else tangent(last.shifted, last.end)
 
 
 def moves_in_plane(state: State, start: Position, move: Motion) -> bool:

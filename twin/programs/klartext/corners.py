@@ -48,7 +48,8 @@ def close(state: State, move: Motion) -> Motion:
         return move
     between = rounding(first, second, pending.size_mm, turn) if pending.rounds else chamfer(first, second, pending.size_mm)
     if between is None:
-        raise RefusedError(pending.text, f"{pending.size_mm:g} mm do not fit between these two moves; a smaller one fits")
+        reason = f"{pending.size_mm:g} mm do not fit between these two moves; a smaller one fits"
+        raise RefusedError(pending.text, reason, (pending.line, state.program))
     state.out[pending.at] = rebuilt(kept, pending.start_mm, trimmed(first, end=between.start), plane)
     corner_start = placed(kept.end_mm, between.start, plane)
     corner_end = placed(kept.end_mm, between.end, plane)

@@ -112,7 +112,9 @@ class Reader:
     def deeper(self, word: str) -> None:
         self.depth += 1
         if self.depth > self.depth_max:
-            raise RefusedError(word, f"brackets and functions are nested deeper than {self.depth_max}; use a parameter in between")
+            raise RefusedError(
+                word, f"brackets and functions are nested deeper than {self.depth_max}; use a parameter in between"
+            )
 
     def chain(self, names: str, operand: Callable[[], Expression]) -> Expression:
         """Left to right, in a loop: a thousand terms must not need a thousand levels of call."""

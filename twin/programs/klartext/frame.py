@@ -107,5 +107,7 @@ class Frame:
         first, second, _ = PLANES[plane]
         a, b = self.factors[first], self.factors[second]
         if not math.isclose(a, b, rel_tol=1e-9):
-            raise RefusedError("", f"cycle 26 scales the axes of this arc by {a:g} and {b:g}: it would be an ellipse; use equal ones")
+            raise RefusedError(
+                "", f"cycle 26 scales the axes of this arc by {a:g} and {b:g}: it would be an ellipse; use equal ones"
+            )
         return a

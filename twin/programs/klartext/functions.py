@@ -156,5 +156,3 @@ def named(state: State, label: str) -> str:
             raise RefusedError(label, "this string parameter has no value that is known")
         return found
     return label.lstrip("0") or "0" if label.isdigit() else label
-
-

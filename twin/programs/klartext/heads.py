@@ -4,8 +4,8 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from twin.programs.klartext import appr_dep, compensation, functions, path, tools
-from twin.programs.klartext.cycles import calling, coordinates, heads, patterns, special
+from twin.programs.klartext import appr_dep, compensation, functions, m_functions, path, tools
+from twin.programs.klartext.cycles import calling, coordinates, defining, patterns, special
 from twin.programs.klartext.numbers import value
 from twin.programs.klartext.source import Source
 from twin.programs.klartext.state import MM_PER_INCH, State
@@ -16,7 +16,9 @@ Command = Callable[[State], None]
 PATH: Final = re.compile(r"(CTP|CP|CR|CT|CC|LP|C|L)(?=[ \t]|[XYZABCUVWMF]?[-+]|R[0LR]|FMAX|I[XYZABC]|P[RA]|DR|$)")
 WAY: Final = re.compile(r"(APPR|DEP)[ \t]++(P?+(?:LCT|LT|LN|CT))(?![A-Z])")
 CORNER: Final = re.compile(r"(RND|CHF)(?![A-QS-Z])")
-CALL: Final = re.compile(r"CALL LBL[ \t]*+(\"[^\"]*+\"|QS[0-9]++|[0-9]++)[ \t]*+(?:REP[ \t]*+([0-9]++|Q[LR]?+[0-9]++)(?:[ \t]*+/[ \t]*+[0-9]++)?+)?+")
+CALL: Final = re.compile(
+    r"CALL LBL[ \t]*+(\"[^\"]*+\"|QS[0-9]++|[0-9]++)[ \t]*+(?:REP[ \t]*+([0-9]++|Q[LR]?+[0-9]++)(?:[ \t]*+/[ \t]*+[0-9]++)?+)?+"
+)
 CYCL_CALL: Final = re.compile(r"CYCL CALL(?:[ \t]++(POS|PAT)(?![A-Z]))?+")
 ASSIGNED: Final = re.compile(r"(?:DECLARE STRING[ \t]++)?+Q[LRS]?+[0-9]++[ \t]*+=")
 M_ALONE: Final = re.compile(r"M[0-9]")
@@ -148,8 +150,6 @@ def begin_program(source: Source) -> Command:
 
 
 def end_program(source: Source) -> Command:
-    from twin.programs.klartext import m_functions
-
     def run(state: State) -> None:
         if not state.flow.end_of_program(state):
             m_functions.end(state, "END PGM")
@@ -174,7 +174,7 @@ HEADS: Final[tuple[tuple[str, Callable[[Source], Command]], ...]] = (
     ("FN", functions.function),
     ("TOOL CALL", lambda source: tools.call(source, len("TOOL CALL"))),
     ("TOOL DEF", lambda source: tools.define(source, len("TOOL DEF"))),
-    ("CYCL DEF", heads.cycl_def),
+    ("CYCL DEF", defining.cycl_def),
     ("CYCL CALL", cycl_call),
     ("CALL LBL", call_label),
     ("CALL PGM", call_program),

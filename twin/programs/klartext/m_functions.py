@@ -48,7 +48,9 @@ def before(state: State, functions: Sequence[MFunction]) -> None:
         if code in REFUSED and code not in state.settings.builder_m_codes:
             raise RefusedError(f"M{code}", REFUSED[code])
         if code not in CODES and code not in state.settings.builder_m_codes:
-            raise RefusedError(f"M{code}", "is not known; if it is the machine builder's, [control] builder_m_codes passes it over")
+            raise RefusedError(
+                f"M{code}", "is not known; if it is the machine builder's, [control] builder_m_codes passes it over"
+            )
         if code in STARTS:
             spindle.turn(state, STARTS[code])
         if code in (8, 13, 14):

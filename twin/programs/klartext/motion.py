@@ -112,15 +112,12 @@ def set_pole(state: State, block: Block) -> None:
     first, second, _ = PLANES[plane]
     if not set(named) <= {first, second}:
         raise RefusedError("CC", "needs both coordinates where one of them is that of the tool's axis")
-    before = state.pole if state.pole is not None and state.pole.plane == plane else None
-    places = []
-    for axis, kept in ((first, before and before.first_mm), (second, before and before.second_mm)):
-        if axis in named:
-            given, incremental = named[axis]
-            places.append(program[axis] + given if incremental else given)
-        else:
-            places.append(kept if named and kept is not None else program[axis])
-    state.pole = Pole(plane, places[0], places[1])
+    kept = {first: program[first], second: program[second]}
+    if named and state.pole is not None and state.pole.plane == plane:
+        kept = {first: state.pole.first_mm, second: state.pole.second_mm}
+    for axis, (given, incremental) in named.items():
+        kept[axis] = program[axis] + given if incremental else given
+    state.pole = Pole(plane, kept[first], kept[second])
 
 
 def take_feed(state: State, block: Block) -> bool:

@@ -14,7 +14,13 @@ from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
 
 OFF_WALL_MM: Final = 0.2
-DIRECTIONS: Final[Mapping[int, tuple[float, float]]] = {0: (0.0, 0.0), 1: (-1.0, 0.0), 2: (0.0, -1.0), 3: (1.0, 0.0), 4: (0.0, 1.0)}
+DIRECTIONS: Final[Mapping[int, tuple[float, float]]] = {
+    0: (0.0, 0.0),
+    1: (-1.0, 0.0),
+    2: (0.0, -1.0),
+    3: (1.0, 0.0),
+    4: (0.0, 1.0),
+}
 
 
 def boring(state: State, cycle: Definition) -> None:

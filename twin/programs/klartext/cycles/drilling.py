@@ -1,7 +1,7 @@
 """Cycles 200, 201, 203, 205, 240, 241: drilling, reaming, centring (Cycle Programming TNC 640, "Fixed cycles: drilling").
 
-Every one goes in rapid to the set-up clearance Q200 above the surface Q203, does its work, and ends at the set-up clearance or, in
-rapid, at the second one, Q204.
+Every one goes in rapid to the set-up clearance Q200 above the surface Q203, does its work, and ends at the set-up clearance or,
+in rapid, at the second one, Q204.
 """
 
 from typing import Final

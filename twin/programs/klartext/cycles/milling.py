@@ -94,9 +94,13 @@ def circular_slot(state: State, cycle: Definition) -> None:
         raise RefusedError("Q375", "the pitch circle is too small for the width Q219")
     place, here = cycle.number_of(367, 0, 3), steps.in_plane(state)
     at = (0.0, begin, begin + opening / 2.0, begin + opening)[place]
-    centre = (cycle.length(216), cycle.length(217)) if place == 0 else (
-        here[0] - pitch * math.cos(at),
-        here[1] - pitch * math.sin(at),
+    centre = (
+        (cycle.length(216), cycle.length(217))
+        if place == 0
+        else (
+            here[0] - pitch * math.cos(at),
+            here[1] - pitch * math.sin(at),
+        )
     )
     for number in range(cycle.number_of(377, 1, state.settings.repeats_max)):
         turn = Turn(centre, math.radians(cycle.value(378)) * number)

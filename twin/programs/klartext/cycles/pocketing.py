@@ -50,7 +50,9 @@ def run(state: State, cycle: Definition, shape: Shape, plunging: int) -> None:
         return
     tool = state.radius_mm(cycle.text)
     if tool <= 0.0 or tool > shape.reach_mm + steps.ROUNDING_MM:
-        raise RefusedError(cycle.text, f"the tool, {tool:g} mm in radius, does not fit into a half width of {shape.reach_mm:g} mm")
+        raise RefusedError(
+            cycle.text, f"the tool, {tool:g} mm in radius, does not fit into a half width of {shape.reach_mm:g} mm"
+        )
     kind, feed = cycle.number_of(215, 0, 2), cycle.cutting_feed(207)
     finishing = cycle.cutting_feed(385) if 385 in cycle.values else feed
     overlap = cycle.value(370)
@@ -59,9 +61,7 @@ def run(state: State, cycle: Definition, shape: Shape, plunging: int) -> None:
     side, bottom = cycle.length(368, 0.0), cycle.length(369, 0.0)
     # Clockwise turning tool: inside a pocket climb milling goes counter-clockwise.
     climb = cycle.number_of(351, -1, 1) >= 0
-    work = Work(
-        shape, tool, side, bottom, feed, cycle.cutting_feed(206), finishing, climb, plunging, overlap * tool
-    )
+    work = Work(shape, tool, side, bottom, feed, cycle.cutting_feed(206), finishing, climb, plunging, overlap * tool)
     clearance = steps.begin(state, cycle)
     surface, deepest = cycle.surface_mm(), total
     origin = steps.in_plane(state)
@@ -96,7 +96,9 @@ def contours(state: State, work: Work, outermost_mm: float) -> list[list[Piece]]
     outermost = min(outermost_mm, reach)
     count = math.ceil((reach - outermost) / work.overlap_mm - steps.ROUNDING_MM)
     if count > state.settings.pecks_max:
-        raise RefusedError("Q370", f"makes more than {state.settings.pecks_max} contours; a larger overlap, or Settings.pecks_max")
+        raise RefusedError(
+            "Q370", f"makes more than {state.settings.pecks_max} contours; a larger overlap, or Settings.pecks_max"
+        )
     insets = [reach - (reach - outermost) * at / count for at in range(count + 1)] if count else [outermost]
     found = [work.shape.contour(inset) for inset in insets]
     return [ring if work.climb else reverse(ring) for ring in found if ring]
@@ -116,8 +118,14 @@ def plunge(state: State, work: Work, above: float, below: float) -> None:
         steps.across(state, centre[0] + radius, centre[1], work.plunge_feed)
         turns = math.ceil((above - below) / (math.tau * radius * slope))
         sweep = math.tau * turns * (1.0 if work.climb else -1.0)
-        put(state, Piece((centre[0] + radius, centre[1]), (centre[0] + radius, centre[1]), centre, sweep), work.plunge_feed, below)
-        put(state, Piece((centre[0] + radius, centre[1]), (centre[0] + radius, centre[1]), centre, math.copysign(math.tau, sweep)), work.plunge_feed)
+        put(
+            state, Piece((centre[0] + radius, centre[1]), (centre[0] + radius, centre[1]), centre, sweep), work.plunge_feed, below
+        )
+        put(
+            state,
+            Piece((centre[0] + radius, centre[1]), (centre[0] + radius, centre[1]), centre, math.copysign(math.tau, sweep)),
+            work.plunge_feed,
+        )
         steps.across(state, *centre, feed_mm_min=work.plunge_feed)
     elif work.plunging == 2 and core:
         steps.to(state, above, work.plunge_feed)
