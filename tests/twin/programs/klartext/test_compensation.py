@@ -14,10 +14,19 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
         ["L X+0 Y+0 RL F100", "L X+50", "L X+70 Y-20 R0"],
         ["line 0 5 0 F100", "line 50 5 0 F100", "line 70 -20 0 F100"],
     ),
-    "to the right": (["L X+0 Y+0 RR F100", "L X+50", "L Y-20 R0"], ["line 0 -5 0 F100", "line 50 -5 0 F100", "line 50 -20 0 F100"]),
+    "to the right": (
+        ["L X+0 Y+0 RR F100", "L X+50", "L Y-20 R0"],
+        ["line 0 -5 0 F100", "line 50 -5 0 F100", "line 50 -20 0 F100"],
+    ),
     "an outside corner on an arc": (
         ["L X+0 Y+0 RL F100", "L X+50", "L Y-50", "L X+70 R0"],
-        ["line 0 5 0 F100", "line 50 5 0 F100", "arc 55 0 0 about 50 0 sweep -90 F100", "line 55 -50 0 F100", "line 70 -50 0 F100"],
+        [
+            "line 0 5 0 F100",
+            "line 50 5 0 F100",
+            "arc 55 0 0 about 50 0 sweep -90 F100",
+            "line 55 -50 0 F100",
+            "line 70 -50 0 F100",
+        ],
     ),
     "an inside corner where the parallels cross": (
         ["L X+0 Y+0 RL F100", "L X+50", "L Y+50", "L X+70 R0"],
@@ -46,7 +55,9 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
     "APPR CT and DEP CT": (
         ["APPR CT X+0 Y+0 CCA90 R+10 RL F100", "L X+50", "DEP CT CCA90 R+10"],
         [
-            "rapid -10 15 0", "arc 0 5 0 about 0 15 sweep 90 F100", "line 50 5 0 F100",
+            "rapid -10 15 0",
+            "arc 0 5 0 about 0 15 sweep 90 F100",
+            "line 50 5 0 F100",
             "arc 60 15 0 about 50 15 sweep 90 F100",
         ],
     ),
@@ -56,13 +67,23 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
     ),
     "APPR CT on the right": (
         ["APPR CT X+0 Y+0 CCA180 R+10 RR F100", "L X+50", "DEP CT CCA90 R+10"],
-        ["rapid 0 -25 0", "arc 0 -5 0 about 0 -15 sweep -180 F100", "line 50 -5 0 F100", "arc 60 -15 0 about 50 -15 sweep -90 F100"],
+        [
+            "rapid 0 -25 0",
+            "arc 0 -5 0 about 0 -15 sweep -180 F100",
+            "line 50 -5 0 F100",
+            "arc 60 -15 0 about 50 -15 sweep -90 F100",
+        ],
     ),
     "APPR goes down at its auxiliary point": (
         ["L Z+2 F500", "APPR LT X+0 Y+0 Z-10 LEN10 RL F100", "L X+50", "DEP LT LEN5 Z+2 FMAX"],
         [
-            "line -20 0 2 F500", "line -10 5 2 F500", "line -10 5 -10 F100", "line 0 5 -10 F100", "line 50 5 -10 F100",
-            "rapid 55 5 -10", "rapid 55 5 2",
+            "line -20 0 2 F500",
+            "line -10 5 2 F500",
+            "line -10 5 -10 F100",
+            "line 0 5 -10 F100",
+            "line 50 5 -10 F100",
+            "rapid 55 5 -10",
+            "rapid 55 5 2",
         ],
     ),
     "APPR LT without a side": (
@@ -72,15 +93,19 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
     "APPR LCT touches the line and the contour": (
         ["L X-10 Y+30 FMAX", "APPR LCT X+0 Y+0 R10 RL F100", "L X+50", "DEP LCT X+60 Y+30 R10 F300"],
         [
-            "rapid -10 30 0", "line -10 15 0 F100", "arc 0 5 0 about 0 15 sweep 90 F100", "line 50 5 0 F100",
-            "arc 60 15 0 about 50 15 sweep 90 F300", "line 60 30 0 F300",
+            "rapid -10 30 0",
+            "line -10 15 0 F100",
+            "arc 0 5 0 about 0 15 sweep 90 F100",
+            "line 50 5 0 F100",
+            "arc 60 15 0 about 50 15 sweep 90 F300",
+            "line 60 30 0 F300",
         ],
     ),
     "RND in a compensated contour": (
         ["L X+0 Y+0 RL F100", "L X+50", "RND R8 F40", "L Y+50", "L X+70 R0"],
         ["line 0 5 0 F100", "line 42 5 0 F100", "arc 45 8 0 about 42 8 sweep 90 F40", "line 45 50 0 F100", "line 70 50 0 F100"],
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("blocks", "moves"), CASES.values(), ids=CASES.keys())

@@ -9,6 +9,7 @@ transformation cycles" (Cycle Programming iTNC 530 and TNC 640).
 """
 
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -142,7 +143,7 @@ def test_the_contour_is_turned_seven_times_about_the_shifted_datum() -> None:
     assert len(plunges) == 8
     leaves = [move.end_mm[:2] for move in moves if move.line == 25 and isinstance(move, Linear)]
     angles = [math.degrees(math.atan2(y - 65.0, x - 65.0)) for x, y in leaves]
-    steps = [(b - a) % 360.0 for a, b in zip(angles, angles[1:], strict=False)]
+    steps = [(b - a) % 360.0 for a, b in pairwise(angles)]
     assert steps == pytest.approx([45.0] * 7)
 
 

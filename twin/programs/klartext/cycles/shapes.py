@@ -1,7 +1,8 @@
 """The outlines of pockets and slots, seen from inside: closed contours at any distance from the wall.
 
 Coordinates are those of the working plane, mm, with the outline's own centre and turn in. A contour runs counter-clockwise and
-begins in the middle of its side at +X (of a circular slot: on its outer arc).
+begins in the middle of its side at +X; of a circular slot where its outer arc begins. From the point where roughing begins a
+straight line leads to the beginning of every contour without touching the wall.
 """
 
 import math
@@ -175,13 +176,12 @@ class RoundSlot:
 
     def contour(self, inset_mm: float) -> list[Piece]:
         r, begin, end = max(self.radius_mm - inset_mm, 0.0), self.begin_rad, self.begin_rad + self.opening_rad
-        middle, turn = begin + self.opening_rad / 2.0, self.turn
+        turn = self.turn
         return [
-            *arc(turn, (0.0, 0.0), self.pitch_mm + r, middle, self.opening_rad / 2.0),
+            *arc(turn, (0.0, 0.0), self.pitch_mm + r, begin, self.opening_rad),
             *arc(turn, self.end_centre(end), r, end, math.pi),
             *arc(turn, (0.0, 0.0), self.pitch_mm - r, end, -self.opening_rad),
             *arc(turn, self.end_centre(begin), r, begin + math.pi, math.pi),
-            *arc(turn, (0.0, 0.0), self.pitch_mm + r, begin, self.opening_rad / 2.0),
         ]
 
     def core(self) -> list[Piece]:
