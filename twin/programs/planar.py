@@ -146,6 +146,9 @@ def trimmed(piece: Piece, start: Point | None = None, end: Point | None = None) 
     direction = 1.0 if piece.sweep_rad > 0 else -1.0
     length = extent(piece) if end is None else along(piece, last, at_end=True)
     begin = 0.0 if start is None else along(piece, first)
+    if end is not None and abs(piece.sweep_rad) > math.tau:
+        # The place on a circle does not tell the turn; an end is cut off by less than half of one.
+        length += math.tau * piece.radius * round((extent(piece) - length) / (math.tau * piece.radius))
     return piece._replace(start=first, end=last, sweep_rad=direction * (length - begin) / piece.radius)
 
 
