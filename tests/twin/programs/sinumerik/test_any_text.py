@@ -21,19 +21,35 @@ BOUNDED = Settings(
     repeats_max=50,
     pecks_max=100,
 )
-WORDS = (
-    "G0 G1 G2 G3 CIP CT G4 G9 G17 G18 G19 G25 G26 G33 G331 G332 G40 G41 G42 G53 SUPA G54 G505 G500 G60 G63 G64 G641 G642 G70 G71 G700 G74 "
-    "G90 G91 G93 G94 G95 G96 G97 G110 G111 G112 G153 G290 G291 G450 G451 CFC CFTCP CFIN NORM KONT TRANS ATRANS ROT AROT SCALE ASCALE "
-    "MIRROR AMIRROR SOFT BRISK FFWON COMPCAD M0 M1 M3 M4 M5 M6 M8 M9 M17 M19 M30 T1 T2 D0 D1 S500 F100 F0.1 X1 X-3.5 Y2 Z-4 X0 Y10 A90 "
-    "X=AC(3) Y=IC(2) A=DC(5) I1 J-2 K3 I=AC(2) I1=3 J1=4 CR=5 CR=-3 AR=90 AP=45 RP=3 TURN=1 RND=1 CHF=1 CHR=2 RNDM=1 RNDM=0 FRC=5 ANG=30 "
-    "RPL=20 LIMS=100 CTOL=0.1 ADIS=0.5 OFFN=1 DISC=0 SPOS=0 R1 R2=3 R[1]=2 R1=R1+1 DEF REAL INT AA BB AA[2] MCALL SUB1 SUB2 L10 P2 "
-    "IF ELSE ENDIF WHILE ENDWHILE FOR TO ENDFOR LOOP ENDLOOP REPEAT UNTIL GOTOF GOTOB GOTO LAB LAB: CASE OF DEFAULT PROC RET CALL "
-    "CYCLE81(5,0,1,-5) CYCLE83(5,0,1,-9,,,2,0,0,0,1,1) CYCLE84(5,0,1,-5,,,3,8) POCKET3(5,0,1,-3,30,20,6,0,0,0,2,0,0,50,40,0,11) "
-    "POCKET4(5,0,1,-3,20,0,0,2,0,0,50,40,0,21,0,0,0,2,1) SLOT1(5,0,1,-3,,2,30,10,0,0,9,0,90,50,40,1,0,0,0) HOLES2(0,0,9,0,,3) "
-    'LONGHOLE(5,0,1,-3,,2,30,0,0,9,0,90,50,40,1) CYCLE71(5,0,1,-2,0,0,30,20,0,1,3,0,0,50,31,0) CYCLE832(0.1,1) MSG("A") STOPRE '
-    "( ) [ ] , = == <> < > + - * / << DIV MOD AND OR NOT SIN( SQRT( ABS( 1 2.5 99999 'HF' \"A\" ; : § é \x00 $P_EP[X] $AA_IM[Z] N10 /2 /"
-).split(" ")
-SOUP = st.sampled_from([*WORDS, "\n", "\n", " "])
+SOUP = st.sampled_from(
+    [
+        *("G0", "G1", "G2", "G3", "CIP", "CT", "G4", "G9", "G17", "G18", "G19", "G25", "G26", "G33", "G331", "G332", "G40"),
+        *("G41", "G42", "G53", "SUPA", "G54", "G505", "G500", "G60", "G63", "G64", "G641", "G642", "G70", "G71", "G700"),
+        *("G74", "G90", "G91", "G93", "G94", "G95", "G96", "G97", "G110", "G111", "G112", "G153", "G290", "G291", "G450"),
+        *("G451", "CFC", "CFTCP", "CFIN", "NORM", "KONT", "TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR"),
+        *("AMIRROR", "SOFT", "BRISK", "FFWON", "COMPCAD", "M0", "M1", "M3", "M4", "M5", "M6", "M8", "M9", "M17", "M19"),
+        *("M30", "T1", "T2", "D0", "D1", "S500", "F100", "F0.1", "X1", "X-3.5", "Y2", "Z-4", "X0", "Y10", "A90", "X=AC(3)"),
+        *("Y=IC(2)", "A=DC(5)", "I1", "J-2", "K3", "I=AC(2)", "I1=3", "J1=4", "CR=5", "CR=-3", "AR=90", "AP=45", "RP=3"),
+        *("TURN=1", "RND=1", "CHF=1", "CHR=2", "RNDM=1", "RNDM=0", "FRC=5", "ANG=30", "RPL=20", "LIMS=100", "CTOL=0.1"),
+        *("ADIS=0.5", "OFFN=1", "DISC=0", "SPOS=0", "R1", "R2=3", "R[1]=2", "R1=R1+1", "DEF", "REAL", "INT", "AA", "BB"),
+        *("AA[2]", "MCALL", "SUB1", "SUB2", "L10", "P2", "IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "FOR", "TO", "ENDFOR"),
+        *("LOOP", "ENDLOOP", "REPEAT", "UNTIL", "GOTOF", "GOTOB", "GOTO", "LAB", "LAB:", "CASE", "OF", "DEFAULT", "PROC"),
+        *("RET", "CALL", "CYCLE81(5,0,1,-5)", "CYCLE83(5,0,1,-9,,,2,0,0,0,1,1)", "CYCLE84(5,0,1,-5,,,3,8)"),
+        *("POCKET3(5,0,1,-3,30,20,6,0,0,0,2,0,0,50,40,0,11)", "POCKET4(5,0,1,-3,20,0,0,2,0,0,50,40,0,21,0,0,0,2,1)"),
+        *("SLOT1(5,0,1,-3,,2,30,10,0,0,9,0,90,50,40,1,0,0,0)", "HOLES2(0,0,9,0,,3)"),
+        *("LONGHOLE(5,0,1,-3,,2,30,0,0,9,0,90,50,40,1)", "CYCLE71(5,0,1,-2,0,0,30,20,0,1,3,0,0,50,31,0)", "CYCLE832(0.1,1)"),
+        *('MSG("A")', "STOPRE", "(", ")", "[", "]", ",", "=", "==", "<>", "<", ">", "+", "-", "*", "/", "<<", "DIV", "MOD"),
+        *("AND", "OR", "NOT", "SIN(", "SQRT(", "ABS(", "1", "2.5", "99999", "'HF'", '"A"', ";", ":", "§", "é", "\x00"),
+        *(
+            "$P_EP[X]",
+            "$AA_IM[Z]",
+            "N10",
+            "/2",
+            "/",
+        ),
+        *("\n", "\n", " "),
+    ]
+)
 SENSE = st.sampled_from(
     [
         *(
