@@ -12,7 +12,12 @@ R_MAX: Final = 9_999
 ELEMENTS_MAX: Final = 10_000
 """Elements of one array, and variables of one program."""
 FIRST: Final[Mapping[str, Value]] = {"REAL": 0.0, "INT": 0.0, "BOOL": 0.0, "CHAR": 0.0, "STRING": "", "AXIS": ""}
-PI: Final = math.pi
+CONSTANTS: Final[Mapping[str, Value]] = {
+    "$PI": math.pi,
+    **{"_OFF": 0.0, "_FINISH": 1.0, "_SEMIFIN": 2.0, "_ROUGH": 3.0},
+    **{"_ORI_FINISH": 11.0, "_ORI_SEMIFIN": 12.0, "_ORI_ROUGH": 13.0},
+}
+"""Names that every control has; the modes of CYCLE832 are among them."""
 
 
 class System(Protocol):
@@ -89,8 +94,8 @@ class Variables:
         cell = self.local.get(name)
         if cell is not None:
             return cell.values[cell.place(index, word)]
-        if name == "$PI":
-            return PI
+        if name in CONSTANTS:
+            return CONSTANTS[name]
         if name.startswith("$"):
             return self.system.read(name, index, word)
         if name in self.system.axes() and not index:
