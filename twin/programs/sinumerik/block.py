@@ -149,6 +149,8 @@ def addressed(token: Token) -> Part:
         code = token.number
         if not code.is_integer() or not 0 <= code <= G_CODE_MAX:
             raise RefusedError(token.text, "is no G code of this control")
+        if f"G{int(code)}" in REFUSED_WORDS:
+            raise RefusedError(token.text, REFUSED_WORDS[f"G{int(code)}"])
         return Name(f"G{int(code)}", token.text)
     if token.name == "L":
         return Name("L" + re.sub(r"[^0-9]", "", token.text), token.text)

@@ -1,8 +1,8 @@
 """G41, G42, G40 with G450, G451, NORM, KONT and OFFN: the section between is kept, and worked out whole (`cutter_path`).
 
-NORM approaches square to the first contour block. KONT does so too where the tool starts on its own side of the contour's tangent;
-behind it, KONT would go round the start, which is not read. CFC and CFIN make the feed that of the contour: on an arc the centre
-goes faster or slower by its own radius over the contour's.
+NORM approaches square to the first contour block. KONT does so too where the tool starts on its own side of the contour's
+tangent; behind it, KONT would go round the start, which is not read. CFC and CFIN make the feed that of the contour: on an arc
+the centre goes faster or slower by its own radius over the contour's.
 """
 
 import math
@@ -128,6 +128,6 @@ def starts_in_front(section: CompensatedSection) -> None:
             left = along[0] * (before[1] - corner[1]) - along[1] * (before[0] - corner[0])
             side = section.offsets_mm.get(index) or 0.0
             if left * side < -REACH_MM:
-                reason = "KONT from behind the contour goes round its start, which is not read; start on the tool's side, or write NORM"
+                reason = "KONT from behind goes round the start, which is not read; start on the tool's side, or write NORM"
                 raise RefusedError("KONT", reason, (move.line, move.program))
             return

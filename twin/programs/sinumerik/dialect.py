@@ -8,13 +8,21 @@ from twin.programs.sinumerik import source_words
 from twin.programs.sinumerik.codes import M_CODES
 from twin.programs.sinumerik.interpreter import interpret
 
+BEGINNINGS: Final = (
+    r"MCALL|DEF[ \t]++(?:REAL|INT|BOOL|STRING|CHAR)|PROC[ \t]|EXTERN[ \t]|CYCLE[0-9]|HOLES[12]\b|POCKET[1-4]\b"
+    r"|SLOT[12]\b|LONGHOLE\b"
+    r"|A?TRANS\b|A?ROT\b|A?SCALE\b|A?MIRROR\b|MSG[ \t]*+\(|WORKPIECE[ \t]*+\(|STOPRE\b|REPEATB?\b"
+    r"|ENDIF\b|ENDLOOP\b|ENDFOR\b|GOTO[FBCS]\b"
+)
+"""Words at the beginning of a block."""
+CODES: Final = r"SUPA|G50[05]|G64[1-5]|G45[01]|FFWON|COMPCAD|COMPON|SOFT|BRISK|TRAORI|CIP|G60[123]|G1(?:10|11|12|53)"
+ADDRESSES: Final = r"CR|AR|AP|RP|RND|RNDM|CHF|CHR|TURN|SPOS|LIMS|ADIS|CTOL|OFFN|ANG|[XYZIJKF]|R(?:[0-9]++|[ \t]*+\[[^]\n]*+\])"
 OWN: Final = re.compile(
     r"^[ \t]*+%_N_\w|^;\$PATH="
-    r"|^[ \t]*+(?:N[0-9]++[ \t]*+)?+(?:MCALL|DEF[ \t]++(?:REAL|INT|BOOL|STRING|CHAR)|PROC[ \t]|EXTERN[ \t]|CYCLE[0-9]|HOLES[12]\b|POCKET[1-4]\b"
-    r"|SLOT[12]\b|LONGHOLE\b|A?TRANS\b|A?ROT\b|A?SCALE\b|A?MIRROR\b|MSG[ \t]*+\(|WORKPIECE[ \t]*+\(|STOPRE\b|REPEATB?\b|ENDIF\b|GOTO[FBCS]\b)"
-    r"|(?<![A-Z0-9_])(?:SUPA|G50[05]|G64[1-5]|G45[01]|FFWON|COMPCAD|COMPON|SOFT|BRISK|TRAORI|CIP|G60[123]|G1(?:10|11|12|53))(?![A-Z0-9_.])"
-    r"|(?<![A-Z0-9_])(?:CR|AR|AP|RP|RND|RNDM|CHF|CHR|TURN|SPOS|LIMS|ADIS|CTOL|OFFN|ANG)[ \t]*+=(?!=)"
-    r"|(?<![A-Z0-9_])[XYZIJKF][ \t]*+=(?!=)|(?<![A-Z0-9_])R(?:[0-9]++|[ \t]*+\[[^]]*+\])[ \t]*+=(?!=)|(?<![A-Z0-9_])T[ \t]*+=[ \t]*+\"|\$[AP]_",
+    rf"|^[ \t]*+(?:N[0-9]++[ \t]*+)?+(?:{BEGINNINGS})"
+    rf"|(?<![A-Z0-9_])(?:{CODES})(?![A-Z0-9_.])"
+    rf"|(?<![A-Z0-9_])(?:{ADDRESSES})[ \t]*+=(?!=)"
+    r"|(?<![A-Z0-9_])T[ \t]*+=[ \t]*+\"|\$[AP]_",
     re.M | re.I,
 )
 """Words that no other language has."""

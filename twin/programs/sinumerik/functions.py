@@ -1,4 +1,4 @@
-"""The operators and functions of expressions ("NC programming", chapters "Operators and arithmetic functions", "String operations").
+"""The operators and functions of expressions ("NC programming", chapters "Arithmetic functions" and "String operations").
 
 Angles are in degrees. Texts join with `<<`, which turns a number into its digits. INT, BOOL and CHAR are numbers.
 """

@@ -24,7 +24,7 @@ ALIASES: Final = {"X1": 0, "Y1": 1, "Z1": 2}
 
 
 def execute(state: State, words: Words) -> bool:
-    """Run a block; calls and ends are left to the interpreter. Returns True where it moved. RefusedError names the word at fault."""
+    """Run a block; calls and ends are left to the interpreter. Returns True where it moved."""
     check(state, words)
     pending, started = state.corner, state.position
     set_modes(state, words)

@@ -71,7 +71,7 @@ def changed(state: State, before: tuple[float | None, float | None]) -> None:
 
 
 def high_speed(state: State, given: list[Value | None]) -> None:
-    """CYCLE832(tolerance, mode, ...): continuous path with that tolerance; without figures, or with mode 0, back to the machine's.
+    """CYCLE832(tolerance, mode, ...): continuous path with that tolerance; without figures, or with mode 0, the machine's.
 
     The last digit of the mode is the kind of cut: 0 off, 1 finishing, 2 semi-finishing, 3 roughing. With 1 in the tens, the third
     figure is the tolerance of rotary axes.

@@ -1,7 +1,7 @@
 """F and S words in the text of a block: found, replaced, added. Nothing else of the line changes, not even its spaces.
 
-A feed is rounded down to a ten-thousandth of itself, so that a limit that was kept stays kept. Feeds and speeds among the arguments
-of a cycle are no words of the block.
+A feed is rounded down to a ten-thousandth of itself, so that a limit that was kept stays kept. Feeds and speeds among the
+arguments of a cycle are no words of the block.
 """
 
 import math
@@ -170,7 +170,7 @@ def exact_feed_figure(feed_mm_min: float, inch: bool) -> str:
 
 
 def inch_lines(lines: list[str], inch: bool = False) -> list[bool]:
-    """Return True for each line with G700 in force; G70 leaves feeds in mm, except on a control that is set up in inches (`inch`).
+    """Return True for each line with G700 in force; G70 leaves feeds in mm, except on a control set up in inches (`inch`).
 
     >>> inch_lines(["G1 F3", "G700", "G1 F3 ;G710", "G710 G1 F3", "G70 F3"])
     [False, True, True, False, False]

@@ -43,7 +43,7 @@ TOKEN: Final = re.compile(
 
 
 class Token(NamedTuple):
-    """kind; name: letter, name or operator in capitals, or the contents of a text; its number; text as written; where it begins."""
+    """kind; name: letter, name or operator in capitals, or the contents of a text; number; text as written; where it begins."""
 
     kind: Kind
     name: str

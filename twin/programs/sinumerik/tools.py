@@ -1,7 +1,7 @@
 """T, M6 and D: the tool in the spindle, its length and its radius.
 
-`Settings.tool_offsets` has one edge a tool, by the number of the tool: D1 is that edge, D0 is none. Without any table lengths are 0.
-The length acts along the normal of the plane, from the next move of that axis on.
+`Settings.tool_offsets` has one edge a tool, by the number of the tool: D1 is that edge, D0 is none. Without any table lengths
+are 0. The length acts along the normal of the plane, from the next move of that axis on.
 """
 
 from typing import Final

@@ -1,4 +1,4 @@
-"""Variables: R parameters of all programs, variables that DEF and PROC make in one program, and a door to the system variables."""
+"""Variables: R parameters of all programs, those that DEF and PROC make in one, and a door to the system variables."""
 
 import math
 from collections.abc import Mapping

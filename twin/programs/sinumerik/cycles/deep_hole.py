@@ -1,11 +1,11 @@
 """CYCLE83: deep-hole drilling, with chip breaking (VARI = 0) or chip removal (VARI = 1).
 
-The strokes, as the manual gives them: the first goes to FDEP, or by FDPR. DAM > 0 takes that much off each further stroke as long
-as the stroke is longer than DAM; then strokes of DAM follow as long as twice DAM is left; the last two are of equal length. DAM < 0
-is a factor, down to _MDEP at least. DAM = 0 keeps the stroke. FRF is a factor on the feed of the first stroke.
+The strokes, as the manual gives them: the first goes to FDEP, or by FDPR. DAM > 0 takes that much off each further stroke as
+long as the stroke stays longer than DAM; then strokes of DAM follow as long as more than twice DAM is left; the last two are of
+equal length. DAM < 0 is a factor, down to _MDEP at least. DAM = 0 keeps the stroke. FRF is a factor on the feed of the first stroke.
 
-Chip removal leaves to the start and comes back in rapid to the limit distance above the last depth: _DIS1, or 0.6 mm, over 30 mm of
-depth a fiftieth of it, at most 7 mm. Chip breaking draws back by _VRT, or 1 mm, with feed.
+Chip removal leaves to the start and comes back in rapid to the limit distance above the last depth: _DIS1, or 0.6 mm, over
+30 mm of depth a fiftieth of it, at most 7 mm. Chip breaking draws back by _VRT, or 1 mm, with feed.
 """
 
 from typing import Final
@@ -27,7 +27,7 @@ def strokes(total: float, first: float, degression: float, least: float, many_ma
     """The depths of all strokes below the reference plane, mm, rising to `total`.
 
     >>> strokes(145.0, 50.0, 20.0, 0.0, 100)
-    [50.0, 80.0, 100.0, 122.5, 145.0]
+    [50.0, 80.0, 100.0, 120.0, 132.5, 145.0]
     """
     first = min(first, total)
     found, done, stroke = [first], first, first
@@ -36,7 +36,7 @@ def strokes(total: float, first: float, degression: float, least: float, many_ma
         if degression > 0.0:
             if stroke - degression > degression:
                 stroke = min(stroke - degression, left)
-            elif left >= 2.0 * degression:
+            elif left > 2.0 * degression:
                 stroke = degression
             else:
                 found += [done + left / 2.0, total]

@@ -42,7 +42,7 @@ def started(state: State, given: Arguments) -> None:
 
 
 def bore(state: State, given: Arguments) -> None:
-    """CYCLE86: at the depth the spindle is oriented, and the tool leaves the wall by RPA, RPO, RPAP; at the end it is over the hole."""
+    """CYCLE86: at the depth the spindle is oriented, and the tool leaves the wall by RPA, RPO, RPAP."""
     heights = levels(state, given)
     started(state, given)
     to(state, heights.start)

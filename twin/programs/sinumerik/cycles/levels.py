@@ -1,7 +1,7 @@
 """The heights of a cycle along the tool, and the moves between them.
 
-The tool goes from the retraction plane RTP to the reference plane RFP, brought forward by the safety clearance SDIS, and from there
-to the depth: DP absolute, or DPR from the reference plane, which goes first where both are given.
+The tool goes from the retraction plane RTP to the reference plane RFP, brought forward by the safety clearance SDIS, and from
+there to the depth: DP absolute, or DPR from the reference plane, which goes first where both are given.
 """
 
 from typing import NamedTuple

@@ -1,6 +1,6 @@
 """HOLES1, HOLES2, CYCLE801, CYCLE802: positions at which the cycle of MCALL is called.
 
-A row begins at the end that is nearer to the tool; a grid at its nearest corner, then to and fro, so that the ways between are short.
+A row begins at the end that is nearer to the tool; a grid at its nearest corner, then to and fro: the ways between are short.
 """
 
 import math

@@ -1,9 +1,9 @@
 """POCKET3, a rectangular pocket, and POCKET4, a round one ("Cycles", chapter "Milling cycles").
 
 Roughing goes down in equal infeeds of at most _MID, at each depth from the middle outwards in rings of equal width, up to the
-finishing allowance _FAL; the base keeps _FALD. Into each depth the tool goes in the middle: in rapid (_VARI 0x), with _FFD (1x), on a
-helix of radius _RAD1 and _DP1 a turn (2x), or to and fro along the length at _RAD1 degrees (3x). Finishing cuts the wall once at each
-infeed, over a quarter of a circle of 2 mm or what fits, and then the base; what has no allowance is left out.
+finishing allowance _FAL; the base keeps _FALD. Into each depth the tool goes in the middle: in rapid (_VARI 0x), with _FFD (1x),
+on a helix of radius _RAD1 and _DP1 a turn (2x), or to and fro along the length at _RAD1 degrees (3x). Finishing cuts the wall
+once at each infeed, over a quarter of a circle of 2 mm or what fits, and then the base; what has no allowance is left out.
 """
 
 import math
@@ -139,7 +139,8 @@ def way_in(state: State, given: Arguments, shape: Shape, pocket: Pocket, how: tu
     before, level, side, _ = how
     way = given.whole("_VARI", 0, 99) // 10
     down_feed = given.number("_FFD") * state.feed_unit_mm
-    to(state, before if way else level)
+    if way < 2:
+        to(state, before if way else level)
     if way == 1:
         shape.line((0.0, 0.0), down_feed, level)
     elif way == 2:
@@ -153,7 +154,8 @@ def way_in(state: State, given: Arguments, shape: Shape, pocket: Pocket, how: tu
         if down / (2.0 * half * math.tan(math.radians(angle))) > HELIX_TURNS_MAX:
             raise RefusedError(f"{given.cycle} _RAD1", "is too flat: more than 10 000 ways to and fro")
         strokes = math.ceil(down / (2.0 * half * math.tan(math.radians(angle))) - SMALL_MM)
-        shape.line((-half, 0.0), down_feed)
+        shape.rapid((-half, 0.0))
+        to(state, before)
         for stroke in range(1, strokes + 1):
             end = half if stroke % 2 else -half
             shape.line((end, 0.0), down_feed, before + (level - before) * stroke / strokes)
@@ -173,7 +175,8 @@ def helix(state: State, given: Arguments, shape: Shape, pocket: Pocket, how: tup
     turns = math.ceil(abs(level - before) / pitch - SMALL_MM)
     if turns > HELIX_TURNS_MAX:
         raise RefusedError(f"{given.cycle} _DP1", "makes more than 10 000 turns")
-    shape.line((radius, 0.0), feed)
+    shape.rapid((radius, 0.0))
+    to(state, before)
     for turn in range(1, turns + 1):
         shape.arc(circle_ring(radius, left)[0], feed, before + (level - before) * turn / turns)
     shape.arc(circle_ring(radius, left)[0], feed)

@@ -1,8 +1,8 @@
 """LONGHOLE, SLOT1 and SLOT2: long holes and slots on a circle ("Cycles", chapter "Milling cycles").
 
-LONGHOLE is as wide as the tool: it goes to and fro along the hole, an infeed at each end. SLOT1 lies along the radius: its near end is
-on the circle RAD. SLOT2 lies on the circle itself; AFSL is the angle between the centres of its round ends. A slot is cut out in equal
-infeeds up to the allowance FAL, then its wall is finished with FFP2 and SSF.
+LONGHOLE is as wide as the tool: it goes to and fro along the hole, an infeed at each end. SLOT1 lies along the radius: its near
+end is on the circle RAD. SLOT2 lies on the circle itself; AFSL is the angle between the centres of its round ends. A slot is cut
+out in equal infeeds up to the allowance FAL, then its wall is finished with FFP2 and SSF.
 """
 
 import math

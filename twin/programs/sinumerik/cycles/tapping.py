@@ -106,14 +106,12 @@ def tap_depths(state: State, given: Arguments, heights: Levels, way: int) -> lis
         return [heights.depth]
     many = math.ceil(total / step - 1e-9)
     if many > state.settings.pecks_max:
-        raise RefusedError(
-            "CYCLE84 _DAM", f"makes more than {state.settings.pecks_max} strokes; a larger one, or Settings.pecks_max"
-        )
+        raise RefusedError("CYCLE84 _DAM", f"makes more than {state.settings.pecks_max} strokes")
     return [*(heights.surface + heights.down * step * (place + 1) for place in range(many - 1)), heights.depth]
 
 
 def with_chuck(state: State, given: Arguments) -> None:
-    """CYCLE840: in by lead and speed, or by F where there is no encoder (ENC = 1); the spindle turns back, and out the same way."""
+    """CYCLE840: in by lead and speed, or by F without an encoder (ENC = 1); the spindle turns back, and out the same way."""
     heights = levels(state, given)
     if state.spindle_direction == 0 or state.rpm <= 0.0:
         raise RefusedError("CYCLE840", "needs a turning spindle; write S and M3 before")
