@@ -29,6 +29,10 @@ class System(Protocol):
 
 
 @dataclass(slots=True)
+KINDS_OF_CUT: Final = {"_OFF": 0.0, "_FINISH": 1.0, "_SEMIFIN": 2.0, "_ROUGH": 3.0}
+"""Names that programs give CYCLE832 in place of its figures."""
+
+
 class Cell:
     """One variable or array: its type, the sizes, and the values, the last index fastest."""
 
@@ -91,6 +95,8 @@ class Variables:
             return cell.values[cell.place(index, word)]
         if name == "$PI":
             return PI
+        if name in KINDS_OF_CUT:
+            return KINDS_OF_CUT[name]
         if name.startswith("$"):
             return self.system.read(name, index, word)
         if name in self.system.axes() and not index:
