@@ -170,7 +170,7 @@ class Settings:
     def called_text(self, name: str) -> str | None:
         """Return the text of a program by the name that calls it, with folder and suffix or without; None = it is not there.
 
-        >>> Settings(programs={"pocket": "M30"}).called_text("TNC:\\NC\\POCKET.H")
+        >>> Settings(programs={"pocket": "M30"}).called_text("TNC:/NC/POCKET.H")
         'M30'
         """
         wanted = _bare(name)

@@ -201,6 +201,8 @@ class Interpreter:
         moved = modes.execute(state, words)
         if len(words.calls) > 1:
             raise RefusedError(words.calls[1].text, "a block calls one subprogram or cycle")
+        if "P" in words.values and not words.calls:
+            raise RefusedError(words.values["P"].text, "says how often a subprogram is called; there is none in this block")
         if words.calls:
             self.call(words.calls[0], words.values["P"].whole(0, self.settings.repeats_max) if "P" in words.values else 1)
         elif moved and flow.modal is not None and not any(level.is_modal for level in flow.levels):

@@ -61,8 +61,19 @@ def steps(moves: list[Move]) -> list[object]:
         # Chip removal: out to the start, back to 0.6 mm above the last depth (30 mm of depth and less).
         (
             "CYCLE83(10,0,2,-25,,,10,0,0.5,0.2,0.5,1)",
-            [("R", 2.0), ("L", -10.0), ("pause", 0.5), ("R", 2.0), ("pause", 0.2), ("R", -9.4), ("L", -20.0), ("pause", 0.5)]
-            + [("R", 2.0), ("pause", 0.2), ("R", -19.4), ("L", -25.0), ("pause", 0.5), ("R", 10.0)],
+            [
+                *(
+                    ("R", 2.0),
+                    ("L", -10.0),
+                    ("pause", 0.5),
+                    ("R", 2.0),
+                    ("pause", 0.2),
+                    ("R", -9.4),
+                    ("L", -20.0),
+                    ("pause", 0.5),
+                ),
+                *(("R", 2.0), ("pause", 0.2), ("R", -19.4), ("L", -25.0), ("pause", 0.5), ("R", 10.0)),
+            ],
         ),
         # Chip breaking: back by 1 mm with feed; or by _VRT.
         (
@@ -75,13 +86,17 @@ def steps(moves: list[Move]) -> list[object]:
         ),
         (
             "CYCLE84(10,0,2,-15,,1,5,,1.25,0,400,800)",
-            [("R", 2.0), "SpindleOrient", ("spindle", 400.0), ("L", -15.0), ("pause", 1.0), ("spindle", -800.0), ("L", 2.0)]
-            + [("spindle", 0.0), ("R", 10.0), ("spindle", 0.0)],
+            [
+                *(("R", 2.0), "SpindleOrient", ("spindle", 400.0), ("L", -15.0), ("pause", 1.0), ("spindle", -800.0), ("L", 2.0)),
+                *(("spindle", 0.0), ("R", 10.0), ("spindle", 0.0)),
+            ],
         ),
         (
             "CYCLE840(10,0,2,-15,,1,0,3,0,,1.25)",
-            [("R", 2.0), ("L", -15.0), ("pause", 1.0), ("spindle", -500.0), ("L", 2.0), ("R", 10.0), ("spindle", 500.0)]
-            + [("spindle", 500.0)],
+            [
+                *(("R", 2.0), ("L", -15.0), ("pause", 1.0), ("spindle", -500.0), ("L", 2.0), ("R", 10.0), ("spindle", 500.0)),
+                ("spindle", 500.0),
+            ],
         ),
     ],
 )

@@ -90,15 +90,13 @@ def test_lines_may_lie_in_a_tilted_frame_and_arcs_corners_and_cycles_may_not() -
 
 @given(
     st.lists(
-        st.sampled_from(
-            ["ATRANS X3 Y-4 Z1", "AROT RPL=33", "AROT X20", "AROT Y-71", "ASCALE X2 Y3 Z0.5", "AMIRROR Y0", "AROT Z5 X7"]
-        ),
+        st.sampled_from(["ATRANS X3 Y-4 Z1", "AROT RPL=33", "AROT X20", "AROT Y-71", "ASCALE X2 Y3 Z0.5", "AMIRROR Y0"]),
         max_size=6,
     ),
     st.tuples(*[st.floats(-100.0, 100.0, allow_subnormal=False)] * 3),
 )
 def test_a_point_comes_back_from_every_chain_of_frames(frames: list[str], point: tuple[float, float, float]) -> None:
-    """What is not named in a block stays where it is in the program, so the point that the frames place is read back from them."""
+    """The point that the frames place in the machine is read back from them as it was."""
     x, y, z = (round(figure, 3) for figure in point)
     text = "\n".join(["G54", *frames, f"G0 X{x:.3f} Y{y:.3f} Z{z:.3f}", "R1=$AA_IW[X] R2=$AA_IW[Y] R3=$AA_IW[Z]"])
     moves = run(f"{text}\nTRANS\nG500 G0 X=R1 Y=R2 Z=R3", Settings(work_offsets_mm={"G54": (5.0, 6.0, 7.0)}))

@@ -1,9 +1,9 @@
 """The examples that Siemens publishes, transcribed as facts: the call, and where it drills or mills.
 
-Source: SINUMERIK 840D/840Di/810D Programming Guide Cycles, edition 11.02 (6FC5298-6AB40-0BP2), the example of each cycle's own
-section: 2.1 drilling cycles, 2.3 drilling patterns, 3 milling cycles; and Programming Guide Fundamentals, edition 10.04, for arcs,
-frames and arithmetic. Tool numbers of edges beyond D1 are written D1 here, since the offset table has one edge a tool; the
-rest of each block is as printed.
+Source: SINUMERIK 840D/840Di/810D Programming Guide Cycles, edition 11.02 (6FC5298-6AB40-0BP2), the example in each cycle's own
+section: 2.1 drilling cycles, 2.3 drilling patterns, 3 milling cycles; Programming Guide Fundamentals, edition 10.04, for arcs,
+frames and the pole. They are written down from knowledge of these manuals, without the printed page beside them: a figure of a call may
+differ from it; what such a call means does not. Edges beyond D1 are written D1, since the offset table has one edge a tool.
 """
 
 import math
@@ -62,18 +62,11 @@ def test_counterboring_with_cycle82() -> None:
 def test_deep_hole_drilling_with_cycle83() -> None:
     """145 mm deep from 150, the first stroke to 100, each further one 20 mm less, the last two equal."""
     moves = run(
-        "N10 G0 G17 G90 F50 S500 M4\nN20 D1 T42 Z155\nN30 X80 Y120\nN40 CYCLE83(155, 150, 1, 5, 0 , 100, , 20, 0, 0, 1, 0)\nN50 M30"
+        "N10 G0 G17 G90 F50 S500 M4\nN20 D1 T42 Z155\nN30 X80 Y120\n"
+        "N40 CYCLE83(155, 150, 1, 5, 0 , 100, , 20, 0, 0, 1, 0)\nN50 M30"
     )
     assert [height for letter, height in heights(moves) if letter == "L"] == [
-        100.0,
-        101.0,
-        70.0,
-        71.0,
-        50.0,
-        51.0,
-        27.5,
-        28.5,
-        5.0,
+        *(100.0, 101.0, 70.0, 71.0, 50.0, 51.0, 30.0, 31.0, 17.5, 18.5, 5.0)
     ]
 
 
@@ -159,7 +152,8 @@ def test_a_dot_matrix_with_cycle801() -> None:
 def test_four_long_holes_with_longhole_in_the_yz_plane() -> None:
     """30 mm long, 23 mm deep, on 20 mm about y = 40, z = 45, at 45° and every 90°."""
     moves = run(
-        "N10 G19 G90 D1 T10 S600 M3\nN20 M6\nN30 G0 Y50 Z25 X5\nN40 LONGHOLE(5, 0, 1, , 23, 4, 30, 40, 45, 20, 45, 90, 100, 320, 6)\nN50 M30",
+        "N10 G19 G90 D1 T10 S600 M3\nN20 M6\nN30 G0 Y50 Z25 X5\n"
+        "N40 LONGHOLE(5, 0, 1, , 23, 4, 30, 40, 45, 20, 45, 90, 100, 320, 6)\nN50 M30",
         tools(4.0),
     )
     down = sorted({round(move.end_mm[0], 6) for move in moves if isinstance(move, Linear)})
@@ -209,7 +203,7 @@ def test_a_rectangular_pocket_with_pocket3() -> None:
 
 
 def test_a_round_pocket_with_pocket4_on_a_helix() -> None:
-    """Radius 25 mm about (60, 40) in the yz plane's sense: here 20 mm deep, in on a helix of 2 mm and 2 mm a turn."""
+    """Radius 25 mm about (60, 40), 20 mm deep, in on a helix of 2 mm radius and 3 mm a turn."""
     moves = run(
         "N10 G17 G90 G0 S650 M3 T20 D1\nN20 M6\nN30 X50 Y50 Z5\n"
         "N40 POCKET4(3, 0, 0.5, -20, 25, 60, 40, 6, 0, 0, 200, 100, 1, 21, 0, 0, 0, 2, 3)\nN50 M30",

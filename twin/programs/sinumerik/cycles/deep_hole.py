@@ -2,7 +2,8 @@
 
 The strokes, as the manual gives them: the first goes to FDEP, or by FDPR. DAM > 0 takes that much off each further stroke as
 long as the stroke stays longer than DAM; then strokes of DAM follow as long as more than twice DAM is left; the last two are of
-equal length. DAM < 0 is a factor, down to _MDEP at least. DAM = 0 keeps the stroke. FRF is a factor on the feed of the first stroke.
+equal length. DAM < 0 is a factor, down to _MDEP at least. DAM = 0 keeps the stroke. FRF is a factor on the feed of the first
+stroke.
 
 Chip removal leaves to the start and comes back in rapid to the limit distance above the last depth: _DIS1, or 0.6 mm, over
 30 mm of depth a fiftieth of it, at most 7 mm. Chip breaking draws back by _VRT, or 1 mm, with feed.
