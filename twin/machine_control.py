@@ -51,7 +51,7 @@ class ControlSection(BaseModel):
     scale_unit: Positive | None = None
     angle_signed: bool | None = None
     arc_radius_error_mm_max: Positive | None = None
-    block_skip: tuple[Annotated[int, Field(ge=1, le=9)], ...] = ()
+    block_skip: tuple[Annotated[int, Field(ge=0, le=9)], ...] = ()
     optional_stop: bool | None = None
     variables: dict[Annotated[str, Field(pattern=r"^[0-9]{1,5}$")], Finite] = Field(default_factory=dict)
     parameters: dict[str, Finite] = Field(default_factory=dict)

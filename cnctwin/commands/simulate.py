@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +12,7 @@ from rich.table import Table
 from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import CalledPrograms
 from cnctwin.files.output import check_suffix, write
 from cnctwin.files.program_text import read_text
 from cnctwin.terminal.console import standard_output
@@ -33,6 +35,7 @@ def simulate(
         from twin.errors import EffectError, PartProgramError
         from twin.machine import read_machine
         from twin.runlog import write_run
+        from twin.simulator.simulation import program_settings
         from twin.simulator.simulation import simulate as simulated
     described = read_machine(machine)
     try:
@@ -43,7 +46,8 @@ def simulate(
     text = read_text(program)
     with working("simulating"):
         try:
-            done = simulated(described, text, seed=seed, name=program.name)
+            settings = replace(program_settings(described), programs=CalledPrograms(program))
+            done = simulated(described, text, seed=seed, settings=settings, name=program.name)
         except PartProgramError as error:
             raise UsageError(f"{program}: {error}") from None
         if out is not None:

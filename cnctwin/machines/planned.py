@@ -4,9 +4,11 @@ The live processors compare each section that has run with them. They belong to 
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import CalledPrograms
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.files.program_text import read_text
 from cnctwin.machines import disk
@@ -34,7 +36,8 @@ def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
     faults = []
     for path in sorted(files):
         try:
-            seconds = section_seconds(machine, read_text(path))
+            settings = replace(machine.settings, programs=CalledPrograms(path))
+            seconds = section_seconds(machine, read_text(path), settings)
         except (TwinError, UsageError) as error:
             if machine.program is None:
                 raise

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cnctwin.files.called_programs import CalledPrograms
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.validation.block_bootstrap import bootstrapped
 from cnctwin.validation.budgets import Budgets
@@ -134,7 +135,8 @@ def whole_of(log: RunLog, path: Path, control: ControlModel) -> Timed | str:
     if any(log.has(name) and float(np.nanmax(np.abs(log[name] - 100.0))) > 0.5 for name in OVERRIDES.values()):
         return "an override was turned"
     try:
-        moves = interpret(path.read_text(encoding="utf-8"), control.settings)
+        settings = replace(control.settings, programs=CalledPrograms(path))
+        moves = interpret(path.read_text(encoding="utf-8"), settings)
         planned = control.model.control.plan(path_from_moves(moves, control.settings.start_mm or None))
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return str(error)

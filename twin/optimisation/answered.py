@@ -61,7 +61,7 @@ def answered(
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
         collisions=made.program.collisions,
-        speed_changes=question.speed_changes,
+        speed_changes=made.groups.changes,
         changes_in_material=len(changes_in_material(made.program, text.path)),
     )
 

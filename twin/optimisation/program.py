@@ -22,7 +22,7 @@ from twin.machine import MachineFile, Tool
 from twin.motion.path import Kind, Path, path_from_moves
 from twin.optimisation.spring_passes import touching
 from twin.programs import Arc, Linear
-from twin.programs.dialect import SourceWords
+from twin.programs.dialect import Dialect, SourceWords
 from twin.programs.discovery import dialect_of
 from twin.programs.source import source_lines
 
@@ -95,19 +95,24 @@ NO_CUTS = Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
 class Programmed:
     """A program on a machine. tools: those that it uses, with their numbers (0 = [tool])
 
-    words: how its language writes feeds and speeds
+    dialect: its language
     notes: sentences on what the machine description does not say; collisions: lines (from 1) with a rapid into material
     """
 
     machine: MachineFile
     text: str
-    words: SourceWords
+    dialect: Dialect
     path: Path
     lines: tuple[FeedLine, ...]
     cuts: Cuts
     tools: tuple[tuple[int, Tool], ...]
     notes: tuple[str, ...]
     collisions: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> SourceWords:
+        """How its language writes feeds and speeds."""
+        return self.dialect.words
 
 
 def programmed(
@@ -177,7 +182,7 @@ def programmed(
     if rows is not None and machine.stock is not None:
         lines = _with_spring_passes(lines, near, touching(path, machine.stock, sections, list(near.values())))
     return _numbered(
-        Programmed(machine, text, words, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
+        Programmed(machine, text, dialect, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
     )
 
 

@@ -15,13 +15,15 @@ from typing import Final
 from twin.programs.arcs import Point
 from twin.programs.canonical import Arc, Linear, Motion, Move, Position, Rapid
 from twin.programs.pieces import piece, placed, rebuilt, rounded, straight
-from twin.programs.planar import Piece, along, extent, left_of, parallel, shared, tangent, trimmed, turn_between
+from twin.programs.planar import Piece, along, crossings, extent, left_of, parallel, shared, tangent, trimmed, turn_between
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import LeadIn, OutsideCorner
 
 REACH_MM: Final = 1e-6
 SMOOTH_RAD: Final = 1e-3
 """Below this change of direction two motions are one smooth line: at 10 mm radius the two ends are 10 µm apart along it."""
+CROSSING_RAD_MAX: Final = math.radians(100.0) + SMOOTH_RAD
+"""Up to this corner the tool goes to where the parallels cross, with `OutsideCorner.CROSSING` (MD20210 of SINUMERIK)."""
 NEARLY_SMOOTH_RAD: Final = 0.035
 """Up to this one, an inside corner whose parallels miss each other by the rounding of the program is taken as smooth."""
 
@@ -127,11 +129,23 @@ def join(first: Side, second: Side, leads_in: bool, lead_in: LeadIn, outside_cor
             meet_halfway(first, second)
         elif turn * first.offset_mm > 0.0:
             inside(first, second, turn)
-        elif outside_corner is OutsideCorner.ARC and not isinstance(first.move, Rapid):
-            sweep = turn
-            first.bridges.append(Piece(first.end, second.begin, first.programmed.end, sweep))
+        elif outside_corner is OutsideCorner.CROSSING and abs(turn) <= CROSSING_RAD_MAX and cross(first, second):
+            pass
+        elif outside_corner is not OutsideCorner.LINE and not isinstance(first.move, Rapid):
+            first.bridges.append(Piece(first.end, second.begin, first.programmed.end, turn))
         else:
             outside(first, second, turn)
+
+
+def cross(first: Side, second: Side) -> bool:
+    """Lengthen both sides of an outside corner up to where their curves cross, if they do so near the corner."""
+    reach_max = abs(first.offset_mm) * math.tan(CROSSING_RAD_MAX / 2.0) + REACH_MM
+    near = [point for point in crossings(first.shifted, second.shifted) if math.dist(point, first.end) <= reach_max]
+    if not near:
+        return False
+    first.end = second.begin = min(near, key=lambda point: math.dist(point, first.programmed.end))
+    second.begin_mm = along(second.shifted, second.begin)
+    return True
 
 
 def normal(piece_of: Piece, at: Point, distance: float) -> Point:

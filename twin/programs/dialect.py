@@ -77,6 +77,7 @@ class Dialect:
     recognises: from 0 (nothing in the text is of this language) to 1 (it can be no other); of several languages the surest is
         taken. Gets at most `RECOGNISED_CHARACTERS_MAX` characters from the beginning of a text
     interpret: raises PartProgramError (line, word, reason) where the control would refuse a block, or it is not read
+    speed_per_tool: the speed stands in the block that calls the tool, and in no other: the optimiser chooses one for each tool
     m_codes: M codes that have a meaning of their own in this language, which a machine builder's cannot take
     """
 
@@ -88,3 +89,4 @@ class Dialect:
     interpret: Callable[[str, Settings], list[Move]]
     words: SourceWords
     m_codes: frozenset[int]
+    speed_per_tool: bool = False

@@ -41,7 +41,9 @@ class OutsideCorner(StrEnum):
     LINE = "line"
     """Up to the crossing of the tangents; round a corner sharper than 90° in a straight line between two points (CCC = 0)."""
     ARC = "arc"
-    """On an arc about the corner (CCC = 1; LinuxCNC)."""
+    """On an arc about the corner (CCC = 1; LinuxCNC; SINUMERIK G450)."""
+    CROSSING = "crossing"
+    """Up to where the parallels cross; on an arc where they do not, and round a corner sharper than 100° (SINUMERIK G451)."""
 
 
 class LeadIn(StrEnum):
@@ -95,10 +97,11 @@ class Settings:
     scale_unit: magnification of one unit of an integer P, I, J, K in G51 (parameter 5400#7)
     angle_signed: ATAN[]/[] in -180..180 and ASIN in -90..90 instead of 0..360 and 270..90 (parameter 6004#0)
     arc_radius_error_mm_max: how far start and end may differ in their distance from the centre (parameter 3410)
-    block_skip: numbers of the block-skip switches that are on; a bare `/` is number 1
+    block_skip: numbers of the block-skip switches that are on; a bare `/` is number 1 (FANUC), 0 (SINUMERIK)
     optional_stop: M1 stops
     subprograms: texts by O number; one that stands in the main text goes first
-    programs: texts of other programs by the name that calls them (CALL PGM, a SINUMERIK subprogram), without folder and suffix
+    programs: texts of other programs by their names without folder and suffix, in small letters: what CALL PGM and the call of a
+        SINUMERIK subprogram name (`called_text`)
     parameters: values of parameters before the start, by name: "Q1", "QL1", "QR1" (HEIDENHAIN), "R10" (SINUMERIK)
     tool_numbers: numbers of tools by their names, where a program calls a tool by name
     variables: values of # variables before the start, also of system variables that a twin cannot know (#3011 …)
@@ -163,3 +166,12 @@ class Settings:
         for name in self.parameters:
             if not PARAMETER_NAME.fullmatch(name):
                 raise TwinError(f"parameter {name!r} is not known; names are such as Q1, QL1, QR1 (HEIDENHAIN), R10 (SINUMERIK)")
+
+    def called_text(self, name: str) -> str | None:
+        """Return the text of a program by the name that calls it, with folder and suffix or without; None = it is not there.
+
+        >>> Settings(programs={"pocket": "M30"}).called_text("TNC:\\NC\\POCKET.H")
+        'M30'
+        """
+        bare = re.split(r"[/\\]", name)[-1].casefold()
+        return self.programs.get(bare, self.programs.get(bare.rpartition(".")[0]))

@@ -20,6 +20,8 @@ from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
 from twin.programs import FeedForward, Settings, interpret
+from twin.programs.called import with_line_elsewhere
+from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond
 
@@ -70,6 +72,8 @@ def simulate(
 ) -> Simulation:
     """Runs a part program on a machine.
 
+    settings: None = those of the machine; else with the texts of the programs that this one calls, whose moves have a line beyond
+        the last one of this text
     seed: None = the machine's mean course, free of noise; a number = one course as its sensors would record it
     start_temperature_c: of the spindle; None = ambient
 
@@ -78,7 +82,7 @@ def simulate(
     """
     notes: list[str] = []
     settings = program_settings(machine) if settings is None else settings
-    moves = interpret(text, settings)
+    moves = with_line_elsewhere(interpret(text, settings), len(source_lines(text)))
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]

@@ -77,7 +77,7 @@ def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Tria
     """
     if unknown := [letter for letter in snippet.letters if letter not in machine.words]:
         raise MachineError(f"no program moves {', '.join(unknown)}; it has words for {', '.join(machine.words)}")
-    moves = interpret(snippet.program(), Settings(axes=machine.words))
+    moves = interpret(snippet.program(), Settings(dialect="fanuc", axes=machine.words))
     planned = plan(path_from_moves(moves, axes=machine.words), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
     motion = sampled(planned, HEAT_PERIOD_S if heat else machine.machine.servo_period_s)

@@ -4,8 +4,7 @@ A run log knows no counter of its running time, so pauses are read off the run i
 (FEED_HOLD, STOPPED, …), and axes that stand for longer than a tool change, a spindle or a dwell of the program makes them.
 """
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from twin.errors import PartProgramError, TwinError
 from twin.motion.limits import stops
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.programs import Settings, interpret
+from twin.programs.discovery import dialect_of
 from twin.recording.program_run import OVERRIDES, Ending, Pause, ProgramRun
 from twin.recording.recorded_program import NOMINAL, RecordedProgram
 from twin.recording.visits import by_visit
@@ -37,7 +37,6 @@ LEVEL = 0.005
 """A straight block of at least this duration shows its feed, where two rows in it tell the same."""
 FEED_OFF = 0.1
 """Feeds of sections that are off by factors further apart than this belong to another program."""
-N_WORD = re.compile(r"^\s*/?\s*N0*(\d+)", re.I)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +127,8 @@ def _compared(name: str, log: RunLog, text: str, fitted: bool, settings: Setting
     if not np.all(path.feed_mm_min > 0.0):
         return Refused(name, f"its program has no feed at line {int(path.line[path.feed_mm_min <= 0.0][0]) + 1}")
     lines = tuple(text.splitlines())
-    path, line, source = by_visit(path, _line_indices(log["line"], text), len(lines))
+    block_number = dialect_of(text, settings).words.block_number
+    path, line, source = by_visit(path, _line_indices(log["line"], text, block_number), len(lines))
     shown = _Shown(lines, source)
     run = _run(log, line, path)
     recorded = RecordedProgram(name, path, run)
@@ -174,11 +174,11 @@ def _run(log: RunLog, line: Ints, path: Path) -> ProgramRun:
     return replace(run, pauses=_pauses(columns, path))
 
 
-def _line_indices(recorded: Floats, text: str) -> Ints:
+def _line_indices(recorded: Floats, text: str, block_number: Callable[[str], int | None]) -> Ints:
     """Lines as indices of the text; N words where the figures go beyond its end and are N words."""
     line = np.where(np.isfinite(recorded), recorded, -1.0).astype(np.int64)
     lines = text.splitlines()
-    words = {int(m[1]): index for index, text_line in enumerate(lines) if (m := N_WORD.match(text_line))}
+    words = {number: index for index, text_line in enumerate(lines) if (number := block_number(text_line)) is not None}
     if line.max() >= len(lines) and all(n in words for n in np.unique(line[line >= 0]).tolist()):
         return np.array([words.get(n, -1) for n in line.tolist()], dtype=np.int64)
     return line

@@ -4,33 +4,17 @@ Most blocks of a long program are plain motions in plain modes. For those one pa
 out at once; everything else is compiled to a `Block` once and run by `modes.execute`.
 """
 
-import re
-from typing import Final
-
 from twin.errors import PartProgramError
-from twin.programs.arcs import by_centre
-from twin.programs.canonical import Arc, Linear, Move, ProgramEnd, Rapid
+from twin.programs.canonical import Move, ProgramEnd
 from twin.programs.fanuc import compensation, flow, modes
 from twin.programs.fanuc.block import Kind, Words, parse
 from twin.programs.fanuc.state import State
 from twin.programs.fanuc.system_variables import SystemVariables
 from twin.programs.fanuc.text import Text
 from twin.programs.fanuc.variables import Variables
+from twin.programs.plain import PLAIN, PLAIN_WITH_POINTS, PlainModes, plain_blocks
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import IntegerWords, Settings
-
-PLAIN_NUMBER: Final = r"[-+]?+(?:[0-9]{1,9}+(?:\.[0-9]{0,15}+)?+|\.[0-9]{1,15}+)"
-POINT_NUMBER: Final = r"[-+]?+(?:[0-9]{1,9}+\.[0-9]{0,15}+|\.[0-9]{1,15}+)"
-
-
-def plain_pattern(length: str) -> re.Pattern[str]:
-    """A block of nothing but `N G0…G3 X Y Z I J F` in this order, each at most once. Possessive: it never goes back."""
-    words = "".join(rf"(?:{letter}({length})[ \t]*+)?+" for letter in "XYZIJF")
-    return re.compile(rf"[ \t]*+(?:N[0-9]++[ \t]*+)?+(?:G0?+([0-3])(?![0-9.])[ \t]*+)?+{words}")
-
-
-PLAIN: Final = plain_pattern(PLAIN_NUMBER)
-PLAIN_WITH_POINTS: Final = plain_pattern(POINT_NUMBER)
 
 
 class Interpreter:
@@ -103,56 +87,22 @@ class Interpreter:
     def plain_blocks(self) -> None:
         """Run plain motions up to the first block that is none. Leaves its line in `level.at`."""
         level, state, modal = self.flow.level, self.state, self.state.modal
-        lines, stop, program = level.text.lines, level.section.stop, level.text.name
-        match, put, new = self.pattern.fullmatch, state.moves.append, tuple.__new__
-        unit, error_max = state.unit_mm, self.settings.arc_radius_error_mm_max
-        absolute, motion, feed = modal.distance == 900, modal.motion // 10, state.feed_word
-        offset_x, offset_y, offset_z = state.coordinates.offset
         x, y, z = state.position
-        start = at = level.at
-        while at < stop:
-            found = match(lines[at])
-            if found is None:
-                break
-            g, x_word, y_word, z_word, i_word, j_word, f_word = found.groups()
-            mode = motion if g is None else int(g)
-            new_feed = feed if f_word is None else float(f_word) * unit
-            if absolute:
-                new_x = x if x_word is None else float(x_word) * unit + offset_x
-                new_y = y if y_word is None else float(y_word) * unit + offset_y
-                new_z = z if z_word is None else float(z_word) * unit + offset_z
-            else:
-                new_x = x if x_word is None else float(x_word) * unit + x
-                new_y = y if y_word is None else float(y_word) * unit + y
-                new_z = z if z_word is None else float(z_word) * unit + z
-            moves = x_word is not None or y_word is not None or z_word is not None
-            if i_word is not None or j_word is not None:
-                centre = (
-                    x if i_word is None else x + float(i_word) * unit,
-                    y if j_word is None else y + float(j_word) * unit,
-                )
-                if mode < 2 or new_feed <= 0.0:
-                    break
-                try:
-                    swept = by_centre((x, y), (new_x, new_y), centre, mode == 2, error_max)
-                except RefusedError:
-                    break  # The long way says it with line and word.
-                end, middle = (new_x, new_y, new_z), (centre[0], centre[1], z)
-                put(new(Arc, (at, end, middle, 17, swept.sweep_rad, new_feed, None, program)))
-            elif moves:
-                if mode == 1 and new_feed > 0.0:
-                    put(new(Linear, (at, (new_x, new_y, new_z), new_feed, None, program)))
-                elif mode == 0 and new_feed >= 0.0:
-                    put(new(Rapid, (at, (new_x, new_y, new_z), program)))
-                else:
-                    break
-            elif new_feed < 0.0:
-                break
-            motion, feed, x, y, z = mode, new_feed, new_x, new_y, new_z
-            at += 1
+        now = PlainModes(
+            modal.motion // 10,
+            modal.distance == 900,
+            (x, y, z),
+            state.coordinates.offset,
+            state.feed_word,
+            state.unit_mm,
+            state.unit_mm,
+            self.settings.arc_radius_error_mm_max,
+        )
+        text, start = level.text, level.at
+        at = plain_blocks(text.lines, start, level.section.stop, text.name, self.pattern.fullmatch, now, state.moves.append)
         if at > start:
-            level.at, modal.motion = at, motion * 10
-            state.feed_word, state.position = feed, (x, y, z)
+            level.at, modal.motion = at, now.motion * 10
+            state.feed_word, state.position = now.feed_mm_min, now.position
             self.count(at - start)
 
     @property

@@ -18,7 +18,7 @@ WORDS = re.compile(r"[A-Za-z]\s*[-+.0-9#\[]")
 FLOW = frozenset({"IF", "GOTO", "WHILE", "DO", "END", "THEN"})
 LABEL = re.compile(r"[ \t]*[NO:][ \t]*[0-9]")
 BLOCK_SKIP = re.compile(r"[ \t]*(?:[O:][ \t]*[0-9]+[ \t]*)?(?:N[ \t]*[0-9]+[ \t]*)?/")
-BLOCK_NUMBER = re.compile(r"^\s*/?\d?\s*N0*(\d+)", re.I)
+BLOCK_NUMBER = re.compile(r"^\s*/?\d?\s*N\s*0*(\d+)", re.I)
 S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})
 S_IS_NO_SPEED_M = frozenset({19, 29, 98, 198})
 """Codes in whose block S is something else: an argument, a clamp, a surface speed, an angle, the speed of a tap."""
