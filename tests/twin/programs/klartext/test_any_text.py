@@ -1,5 +1,7 @@
 """Whatever the text: it is run or refused, in bounds; numbering, spaces and comments change nothing."""
 
+from contextlib import suppress
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -97,7 +99,23 @@ def test_any_characters_are_split_into_blocks_in_order(text: str) -> None:
     found = blocks(text)
     assert all(len(source.body) == len(source.written) for source in found)
     assert [source.line for source in found] == sorted({source.line for source in found})
-    try:
+    with suppress(PartProgramError):
         interpret(text, BOUNDS)
-    except PartProgramError:
-        pass
+
+
+PLAIN_WORDS = st.tuples(
+    st.sampled_from(["", " X+5", " X-0,25", " X3."]),
+    st.sampled_from(["", " Y+1", " Y-.5"]),
+    st.sampled_from(["", " Z-2"]),
+    st.sampled_from(["", " R0"]),
+    st.sampled_from(["", " F100", " FMAX", " F12.5", " F MAX"]),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.builds("".join, PLAIN_WORDS), min_size=1, max_size=6), st.sampled_from(["MM", "INCH"]))
+def test_the_short_way_is_the_long_way(words: list[str], unit: str) -> None:
+    """M107 changes nothing, and has no short way."""
+    short = "\n".join([f"BEGIN PGM A {unit}", "L X+1 F50", *(f"L{one}" for one in words)])
+    long = "\n".join([f"BEGIN PGM A {unit}", "L X+1 F50 M107", *(f"L{one} M107" for one in words)])
+    assert interpret(short, BOUNDS) == interpret(long, BOUNDS)
