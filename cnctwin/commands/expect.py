@@ -2,7 +2,6 @@
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +11,7 @@ from rich.table import Table
 from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
-from cnctwin.files.called_programs import CalledPrograms
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_text import read_text
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
@@ -58,7 +57,7 @@ def expect(
             continue
         with working(f"working out {program.name}"):
             try:
-                settings = replace(program_settings(described), programs=CalledPrograms(program))
+                settings = with_called_programs(program_settings(described), program, source)
                 made = expectation_of(
                     described, source, table, program.stem, numbering=numbering, settings=settings, description=version
                 )

@@ -4,11 +4,10 @@ The live processors compare each section that has run with them. They belong to 
 """
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 from cnctwin.errors import UsageError
-from cnctwin.files.called_programs import CalledPrograms
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.files.program_text import read_text
 from cnctwin.machines import disk
@@ -36,8 +35,8 @@ def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
     faults = []
     for path in sorted(files):
         try:
-            settings = replace(machine.settings, programs=CalledPrograms(path))
-            seconds = section_seconds(machine, read_text(path), settings)
+            text = read_text(path)
+            seconds = section_seconds(machine, text, with_called_programs(machine.settings, path, text))
         except (TwinError, UsageError) as error:
             if machine.program is None:
                 raise

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cnctwin.files.called_programs import CalledPrograms
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.validation.block_bootstrap import bootstrapped
 from cnctwin.validation.budgets import Budgets
@@ -135,8 +135,8 @@ def whole_of(log: RunLog, path: Path, control: ControlModel) -> Timed | str:
     if any(log.has(name) and float(np.nanmax(np.abs(log[name] - 100.0))) > 0.5 for name in OVERRIDES.values()):
         return "an override was turned"
     try:
-        settings = replace(control.settings, programs=CalledPrograms(path))
-        moves = interpret(path.read_text(encoding="utf-8"), settings)
+        text = path.read_text(encoding="utf-8")
+        moves = interpret(text, with_called_programs(control.settings, path, text))
         planned = control.model.control.plan(path_from_moves(moves, control.settings.start_mm or None))
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return str(error)

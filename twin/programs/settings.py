@@ -100,8 +100,8 @@ class Settings:
     block_skip: numbers of the block-skip switches that are on; a bare `/` is number 1 (FANUC), 0 (SINUMERIK)
     optional_stop: M1 stops
     subprograms: texts by O number; one that stands in the main text goes first
-    programs: texts of other programs by their names without folder and suffix, in small letters: what CALL PGM and the call of a
-        SINUMERIK subprogram name (`called_text`)
+    programs: texts of other programs by their names without folder and suffix: what CALL PGM and the call of a SINUMERIK
+        subprogram name (`called_text`)
     parameters: values of parameters before the start, by name: "Q1", "QL1", "QR1" (HEIDENHAIN), "R10" (SINUMERIK)
     tool_numbers: numbers of tools by their names, where a program calls a tool by name
     variables: values of # variables before the start, also of system variables that a twin cannot know (#3011 …)
@@ -173,5 +173,12 @@ class Settings:
         >>> Settings(programs={"pocket": "M30"}).called_text("TNC:/NC/POCKET.H")
         'M30'
         """
-        bare = re.split(r"[/\\]", name)[-1].casefold()
-        return self.programs.get(bare, self.programs.get(bare.rpartition(".")[0]))
+        wanted = _bare(name)
+        known = next((one for one in self.programs if _bare(one) == wanted), None)
+        return None if known is None else self.programs[known]
+
+
+def _bare(name: str) -> str:
+    """Return the name of a program without folder, suffix and the marks of its kind, in small letters."""
+    last = re.split(r"[/\\]", name.strip().strip('"'))[-1].casefold().removeprefix("_n_")
+    return re.sub(r"[._](h|i|mpf|spf)$", "", last)

@@ -155,19 +155,30 @@ def test_feeds_written_into_a_program_are_the_feeds_that_are_read(dialect: Diale
 
 @every_dialect
 def test_a_feed_is_added_to_a_line_that_has_none(dialect: Dialect) -> None:
+    """Or it stays as it is, where the language has none there."""
     text, words, tried = text_of(dialect, "plate"), dialect.words, 0
     before = interpret(text, SETTINGS)
     cutting = {move.line for move in before if isinstance(move, Linear | Arc)}
     for number in sorted(cutting):
         line = source_lines(text)[number]
-        if words.feed_place(line) is not None or not words.takes_feed(line) or words.with_feed(line, "333") == line:
+        if words.feed_place(line) is not None or words.with_feed(line, "333") == line:
             continue
         after = interpret(joined(text, {number: words.with_feed(line, "333")}), SETTINGS)
         pairs = zip(before, after, strict=True)
-        of_line = [new for old, new in pairs if isinstance(old, Linear | Arc) and old.line == number]
-        assert {one.feed_mm_min for one in of_line if isinstance(one, Linear | Arc)} == {333.0}
+        feeds = {new.feed_mm_min for old, new in pairs if old.line == number and isinstance(new, Linear | Arc)}
+        assert feeds == {333.0} or not words.takes_feed(line)
         tried += 1
     assert tried >= 3
+
+
+@every_dialect
+def test_a_line_that_takes_a_feed_is_one_that_moves(dialect: Dialect) -> None:
+    """Every line of the plate is run; one that would take a feed and did not move would be told as a branch that was not."""
+    text = text_of(dialect, "plate")
+    moved = {move.line for move in interpret(text, SETTINGS)}
+    taking = {number for number, line in enumerate(source_lines(text)) if dialect.words.takes_feed(line)}
+    assert taking <= moved
+    assert len(taking) >= 10
 
 
 @every_dialect

@@ -32,4 +32,5 @@ DIALECT = Dialect(
     interpret=interpret,
     words=words,
     m_codes=CODES,
+    speed_per_tool=True,
 )

@@ -103,12 +103,12 @@ class Flow:
         stem = PureWindowsPath(name.strip().strip('"').replace("/", "\\")).name
         if stem.upper().endswith((".H", ".I")):
             stem = stem[:-2]
-        for known, text in self.settings.programs.items():
-            if known.upper() in (stem.upper(), f"{stem.upper()}.H"):
-                if known not in self.texts:
-                    self.texts[known] = Text(text, known)
-                return self.texts[known]
-        raise RefusedError(word, f"there is no program {stem} with this one; Settings.programs takes its text")
+        if stem.upper() not in self.texts:
+            text = self.settings.called_text(stem)
+            if text is None:
+                raise RefusedError(word, f"there is no program {stem} with this one; its file has to lie beside it")
+            self.texts[stem.upper()] = Text(text, stem.upper())
+        return self.texts[stem.upper()]
 
     def end_of_program(self, state: "State") -> bool:
         """END PGM or the end of a text: back to the caller; False in the main program."""

@@ -1,11 +1,12 @@
 """The interpreter: a Klartext program in, canonical moves out.
 
-Each block is compiled once to what it does (`heads.compiled`) and kept, so that loops cost no more than they should.
+Plain straight moves take the short way of `plain`; every other block is compiled once to what it does (`heads.compiled`) and
+kept, so that loops cost no more than they should.
 """
 
 from twin.errors import PartProgramError
 from twin.programs.canonical import Move
-from twin.programs.klartext import m_functions
+from twin.programs.klartext import m_functions, plain
 from twin.programs.klartext.flow import Flow
 from twin.programs.klartext.heads import Command, compiled
 from twin.programs.klartext.source import Text
@@ -30,6 +31,9 @@ class Interpreter:
         """All moves of the program; PartProgramError at the first block that cannot be run."""
         try:
             while not self.flow.ended:
+                if plain.is_plain(self.state):
+                    left = self.settings.blocks_max - self.blocks_run
+                    self.blocks_run += plain.run(self.state, self.flow.level, left)
                 self.block()
         except RefusedError as refused:
             line, program = refused.place or (self.state.line, self.state.program)

@@ -15,7 +15,7 @@ from twin.programs.source import WordPlace
 
 DIGITS: Final = 4
 PATH: Final = re.compile(
-    r"(?:CTP|CP|CR|CT|LP|C|L|RND|CHF|(?:DEP|APPR)[ \t]++P?+(?:LCT|LT|LN|CT))(?=[ \t+\-IXYZABCUVWFMRDP0-9]|$)"
+    r"(?:CTP|CP|CR|CT|LP|C(?!C|YCL|ALL)|L(?!BL)|RND|CHF|(?:DEP|APPR)[ \t]++P?+(?:LCT|LT|LN|CT))(?=[ \t+\-IXYZABCUVWFMRDP0-9]|$)"
 )
 GOES: Final = re.compile(r"I?+(?:[XYZABCUVW]|P[RA])")
 TOOL_CALL: Final = re.compile(r"TOOL CALL(?:[ \t]++\"[^\"]*+\")?+")
@@ -87,6 +87,8 @@ def speed_place(line: str) -> WordPlace | None:
 def with_feed(line: str, figure: str) -> str:
     """Return the block with this F; one with FMAX, and a line that is no path block, as they are.
 
+    >>> with_feed("26 CYCL CALL", "250"), with_feed("CALL LBL 1", "250"), with_feed("LBL 1", "250")
+    ('26 CYCL CALL', 'CALL LBL 1', 'LBL 1')
     >>> with_feed("8 L X+5 R0 F300 M3", "250"), with_feed("8 L X+5 R0 M3 ; on", "250"), with_feed("9 L Z+2 FMAX", "250")
     ('8 L X+5 R0 F250 M3', '8 L X+5 R0 F250 M3 ; on', '9 L Z+2 FMAX')
     """

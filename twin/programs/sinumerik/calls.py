@@ -6,7 +6,7 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.expressions import Expression, Variable
 from twin.programs.sinumerik.flow import Flow, Level
 from twin.programs.sinumerik.syntax import Procedure
-from twin.programs.sinumerik.text import Section, Text, program_name
+from twin.programs.sinumerik.text import Section, Text
 
 UNKNOWN: Final = "there is no such subprogram, cycle or G code here; a subprogram's text has to be given with the program"
 
@@ -17,7 +17,7 @@ def find(flow: Flow, name: str) -> tuple[Text, Section] | None:
         if name in text.programs:
             return text, text.programs[name]
     if name not in flow.texts:
-        given = next((text for key, text in flow.settings.programs.items() if program_name(key) == name), None)
+        given = flow.settings.called_text(name)
         if given is None:
             return None
         flow.texts[name] = Text(given, name)
