@@ -28,11 +28,11 @@ class System(Protocol):
         """Names of the axes in capitals, which may stand as an index."""
 
 
-@dataclass(slots=True)
 KINDS_OF_CUT: Final = {"_OFF": 0.0, "_FINISH": 1.0, "_SEMIFIN": 2.0, "_ROUGH": 3.0}
 """Names that programs give CYCLE832 in place of its figures."""
 
 
+@dataclass(slots=True)
 class Cell:
     """One variable or array: its type, the sizes, and the values, the last index fastest."""
 
