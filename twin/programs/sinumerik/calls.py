@@ -3,10 +3,10 @@
 from typing import Final
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.expressions import Expression, Variable
 from twin.programs.sinumerik.flow import Flow, Level
-from twin.programs.sinumerik.syntax import Procedure
-from twin.programs.sinumerik.text import Section, Text
+from twin.programs.sinumerik.language.expressions import Expression, Variable
+from twin.programs.sinumerik.language.syntax import Procedure
+from twin.programs.sinumerik.language.text import Section, Text
 
 UNKNOWN: Final = "there is no such subprogram, cycle or G code here; a subprogram's text has to be given with the program"
 

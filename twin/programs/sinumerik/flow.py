@@ -5,8 +5,8 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-from twin.programs.sinumerik.functions import Value, as_text, as_whole, is_true
-from twin.programs.sinumerik.syntax import (
+from twin.programs.sinumerik.language.functions import Value, as_text, as_whole, is_true
+from twin.programs.sinumerik.language.syntax import (
     Assignment,
     Case,
     Definition,
@@ -16,7 +16,7 @@ from twin.programs.sinumerik.syntax import (
     Repeat,
     Target,
 )
-from twin.programs.sinumerik.text import Section, Text
+from twin.programs.sinumerik.language.text import Section, Text
 from twin.programs.sinumerik.variables import Cell, Variables
 
 SKIPPED_NAME_MAX: Final = 40

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from twin.programs.sinumerik.codes import GROUPS
-from twin.programs.sinumerik.statements import STATEMENTS
-from twin.programs.sinumerik.tokens import CAPITALS, PLAIN, TOKEN
+from twin.programs.sinumerik.language.statements import STATEMENTS
+from twin.programs.sinumerik.language.tokens import CAPITALS, PLAIN, TOKEN
 from twin.programs.source import WordPlace
 
 INCH_MM: Final = 25.4

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.functions import Value, as_number, as_text, as_whole, checked, round_half_up
+from twin.programs.sinumerik.language.functions import Value, as_number, as_text, as_whole, checked, round_half_up
 
 R_MAX: Final = 9_999
 ELEMENTS_MAX: Final = 10_000

@@ -8,9 +8,9 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik import compensation
 from twin.programs.sinumerik.cycles import deep_hole, drilling, face, patterns, pocket, slot, tapping
 from twin.programs.sinumerik.cycles.arguments import NEWER, Arguments
-from twin.programs.sinumerik.functions import Value
+from twin.programs.sinumerik.language.functions import Value
+from twin.programs.sinumerik.language.syntax import Invocation, Name
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.syntax import Invocation, Name
 
 DEPTH: Final = ("RTP", "RFP", "SDIS", "DP", "DPR")
 MODES: Final = ("_GMODE", "_DMODE", "_AMODE")

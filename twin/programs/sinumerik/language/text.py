@@ -7,8 +7,8 @@ import re
 from typing import Final, NamedTuple
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.syntax import Block
-from twin.programs.sinumerik.tokens import CAPITALS
+from twin.programs.sinumerik.language.syntax import Block
+from twin.programs.sinumerik.language.tokens import CAPITALS
 
 HEADER: Final = re.compile(r"[ \t]*+%[ \t]*+([A-Z0-9_]++)?+")
 HEAD: Final = re.compile(
