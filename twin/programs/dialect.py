@@ -11,7 +11,7 @@ from twin.programs.canonical import Move
 from twin.programs.settings import Settings
 from twin.programs.source import WordPlace
 
-RECOGNISED_CHARACTERS_MAX: Final = 100_000
+RECOGNISED_CHARACTERS_MAX: Final = 20_000
 """A language is told from the beginning of a text, up to here."""
 
 

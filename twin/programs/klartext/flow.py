@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING
 
+from twin.programs.called import NOT_AT_HAND
 from twin.programs.klartext.source import Text
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
@@ -106,7 +107,7 @@ class Flow:
         if stem.upper() not in self.texts:
             text = self.settings.called_text(stem)
             if text is None:
-                raise RefusedError(word, f"there is no program {stem} with this one; its file has to lie beside it")
+                raise RefusedError(word, f"the program {stem} is called, and {NOT_AT_HAND}")
             self.texts[stem.upper()] = Text(text, stem.upper())
         return self.texts[stem.upper()]
 
