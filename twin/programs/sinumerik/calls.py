@@ -4,10 +4,10 @@ from typing import Final
 
 from twin.programs.called import NOT_AT_HAND
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.expressions import Expression, Variable
 from twin.programs.sinumerik.flow import Flow, Level
-from twin.programs.sinumerik.syntax import Procedure
-from twin.programs.sinumerik.text import Section, Text
+from twin.programs.sinumerik.language.expressions import Expression, Variable
+from twin.programs.sinumerik.language.syntax import Procedure
+from twin.programs.sinumerik.language.text import Section, Text
 
 UNKNOWN: Final = f"there is no such subprogram, cycle or G code here; if it is a subprogram, {NOT_AT_HAND}"
 

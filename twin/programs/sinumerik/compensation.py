@@ -15,7 +15,7 @@ from twin.programs.refusal import RefusedError
 from twin.programs.settings import LeadIn, OutsideCorner
 from twin.programs.sinumerik.codes import ARC_CODES
 from twin.programs.sinumerik.state import Compensation, State
-from twin.programs.sinumerik.tools import tool_radius
+from twin.programs.sinumerik.tool import tool_radius
 from twin.programs.sinumerik.words import Words
 
 CORNERS: Final = {"G450": OutsideCorner.ARC, "G451": OutsideCorner.CROSSING}

@@ -26,13 +26,15 @@ OWN: Final = re.compile(
     re.M | re.I,
 )
 """Words that no other language has."""
+OUTSIDE: Final = re.compile(r"\([^()\n]*+\)|(?<=;)(?!\$PATH).*+")
+"""What stands in brackets, a comment elsewhere, and behind `;`: it tells nothing of the language."""
 COMMENT: Final = re.compile(r"^[ \t]*+;", re.M)
 PLAIN: Final = re.compile(r"(?<![A-Z_])[GMXYZ][ \t]*+[-+]?+\.?+[0-9]", re.I)
 
 
 def recognises(text: str) -> float:
     """Return 0.95 for a text with words of this language alone, 0.4 for plain ISO words beside a comment behind `;`."""
-    if OWN.search(text) is not None:
+    if OWN.search(OUTSIDE.sub("()", text)) is not None:
         return 0.95
     return 0.4 if COMMENT.search(text) is not None and PLAIN.search(text) is not None else 0.0
 

@@ -5,8 +5,8 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-from twin.programs.sinumerik.functions import Value, as_text, as_whole, is_true
-from twin.programs.sinumerik.syntax import (
+from twin.programs.sinumerik.language.functions import Value, as_text, as_whole, is_true
+from twin.programs.sinumerik.language.syntax import (
     Assignment,
     Case,
     Definition,
@@ -16,7 +16,7 @@ from twin.programs.sinumerik.syntax import (
     Repeat,
     Target,
 )
-from twin.programs.sinumerik.text import Section, Text
+from twin.programs.sinumerik.language.text import Section, Text
 from twin.programs.sinumerik.variables import Cell, Variables
 
 SKIPPED_NAME_MAX: Final = 40
@@ -63,7 +63,7 @@ class Flow:
     def __init__(self, text: Text, settings: Settings, variables: Variables) -> None:
         self.settings, self.variables, self.jumps = settings, variables, 0
         self.texts: dict[str, Text] = {}
-        main = text.sections[0]
+        main = text.main
         self.levels = [Level(text, main, main.start, variables.local)]
         self.modal: Name | Invocation | None = None
 
@@ -84,6 +84,7 @@ class Flow:
         if target.direction == "GOTOS":
             level.at = level.section.start
             level.regions.clear()
+            level.local.clear()
             return
         label = f"N{target.number}" if target.number is not None else target.label
         if target.made is not None:

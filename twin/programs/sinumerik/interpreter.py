@@ -8,14 +8,12 @@ from twin.programs.plain import PLAIN, PlainModes, plain_blocks
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
 from twin.programs.sinumerik import calls, compensation, corners, modes, motion, smoothing
-from twin.programs.sinumerik.block import parse
 from twin.programs.sinumerik.cycles.catalogue import CYCLES, REFUSED_CYCLES, run_cycle
 from twin.programs.sinumerik.flow import Flow
 from twin.programs.sinumerik.frames import IDENTITY
-from twin.programs.sinumerik.functions import as_text
-from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.structures import structure
-from twin.programs.sinumerik.syntax import (
+from twin.programs.sinumerik.language.block import parse
+from twin.programs.sinumerik.language.functions import as_text
+from twin.programs.sinumerik.language.syntax import (
     Block,
     CallByName,
     Case,
@@ -30,8 +28,10 @@ from twin.programs.sinumerik.syntax import (
     Structure,
     Words,
 )
+from twin.programs.sinumerik.language.text import Text, program_name
+from twin.programs.sinumerik.state import State
+from twin.programs.sinumerik.structures import structure
 from twin.programs.sinumerik.system_variables import SystemVariables
-from twin.programs.sinumerik.text import Text, program_name
 from twin.programs.sinumerik.variables import Variables
 from twin.programs.sinumerik.words import evaluated
 

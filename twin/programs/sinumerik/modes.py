@@ -4,7 +4,7 @@ from typing import Final
 
 from twin.programs.canonical import Coolant, Dwell, ProgramStop
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik import compensation, contour, corners, motion, smoothing, spindle, tools, transformations
+from twin.programs.sinumerik import compensation, contour, corners, motion, smoothing, spindle, tool, transformations
 from twin.programs.sinumerik.codes import ARC_CODES, M_CODES
 from twin.programs.sinumerik.state import State
 from twin.programs.sinumerik.words import Words
@@ -30,7 +30,7 @@ def execute(state: State, words: Words) -> bool:
     set_modes(state, words)
     smoothing.modes(state, words)
     corners.modes(state, words)
-    tools.select(state, words)
+    tool.select(state, words)
     spindle.command(state, words)
     for code in words.m:
         if code in (7, 8, 9):
@@ -89,7 +89,7 @@ def set_modes(state: State, words: Words) -> None:
             if group == "plane":
                 state.tangent, state.pole.centre = None, (0.0, 0.0)
                 state.pole.radius_mm = state.pole.angle_deg = None
-                tools.set_length(state, words.written[group])
+                tool.set_length(state, words.written[group])
     if "motion" in codes:
         modal["motion"] = codes["motion"]
     if "feed" in codes and codes["feed"] != modal["feed"]:

@@ -8,7 +8,7 @@ from typing import Final
 
 from twin.programs.canonical import ExactStop, FeedForward, JerkLimit, Tolerance
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.functions import Value, as_number, as_whole
+from twin.programs.sinumerik.language.functions import Value, as_number, as_whole
 from twin.programs.sinumerik.state import State
 from twin.programs.sinumerik.words import Words
 

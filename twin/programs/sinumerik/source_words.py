@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from twin.programs.sinumerik.codes import GROUPS
-from twin.programs.sinumerik.statements import STATEMENTS
-from twin.programs.sinumerik.tokens import CAPITALS, PLAIN, TOKEN
+from twin.programs.sinumerik.language.statements import STATEMENTS
+from twin.programs.sinumerik.language.tokens import CAPITALS, PLAIN, TOKEN
 from twin.programs.source import WordPlace
 
 INCH_MM: Final = 25.4
@@ -205,7 +205,7 @@ def branches(lines: list[str]) -> list[bool]:
         own = next((name for name in names if calls(name, upper)), None)
         if "MCALL" in names:
             modal = len(names) > 1
-        marked.append((upper.lstrip().startswith("/") or leads or own is not None or modal or "MCALL" in names, upper))
+        marked.append((upper.lstrip().startswith(("/", "%")) or leads or own is not None or modal or "MCALL" in names, upper))
     return [one or (jumps and is_aim(upper)) for one, upper in marked]
 
 

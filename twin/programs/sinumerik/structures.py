@@ -2,8 +2,8 @@
 
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.flow import Flow
-from twin.programs.sinumerik.functions import as_number, is_true
-from twin.programs.sinumerik.syntax import Structure
+from twin.programs.sinumerik.language.functions import as_number, is_true
+from twin.programs.sinumerik.language.syntax import Structure
 
 
 def structure(flow: Flow, statement: Structure) -> None:

@@ -9,9 +9,9 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import ToolOffset
-from twin.programs.sinumerik.functions import Value, as_number, as_text, as_whole
+from twin.programs.sinumerik.language.functions import Value, as_number, as_text, as_whole
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.tools import offset, set_length, tool_radius
+from twin.programs.sinumerik.tool import offset, set_length, tool_radius
 
 PLACES: Final = frozenset({"$P_EP", "$AA_IW", "$AA_IM", "$P_EPM"})
 COLUMNS: Final = {"$TC_DP3": "length_mm", "$TC_DP6": "radius_mm", "$TC_DP12": "length_wear_mm", "$TC_DP15": "radius_wear_mm"}

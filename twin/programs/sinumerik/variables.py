@@ -6,13 +6,18 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.functions import Value, as_number, as_text, as_whole, checked, round_half_up
+from twin.programs.sinumerik.language.functions import Value, as_number, as_text, as_whole, checked, round_half_up
 
 R_MAX: Final = 9_999
 ELEMENTS_MAX: Final = 10_000
 """Elements of one array, and variables of one program."""
 FIRST: Final[Mapping[str, Value]] = {"REAL": 0.0, "INT": 0.0, "BOOL": 0.0, "CHAR": 0.0, "STRING": "", "AXIS": ""}
-PI: Final = math.pi
+CONSTANTS: Final[Mapping[str, Value]] = {
+    "$PI": math.pi,
+    **{"_OFF": 0.0, "_FINISH": 1.0, "_SEMIFIN": 2.0, "_ROUGH": 3.0},
+    **{"_ORI_FINISH": 11.0, "_ORI_SEMIFIN": 12.0, "_ORI_ROUGH": 13.0},
+}
+"""Names that every control has; the modes of CYCLE832 are among them."""
 
 
 class System(Protocol):
@@ -26,10 +31,6 @@ class System(Protocol):
 
     def axes(self) -> tuple[str, ...]:
         """Names of the axes in capitals, which may stand as an index."""
-
-
-KINDS_OF_CUT: Final = {"_OFF": 0.0, "_FINISH": 1.0, "_SEMIFIN": 2.0, "_ROUGH": 3.0}
-"""Names that programs give CYCLE832 in place of its figures."""
 
 
 @dataclass(slots=True)
@@ -93,10 +94,8 @@ class Variables:
         cell = self.local.get(name)
         if cell is not None:
             return cell.values[cell.place(index, word)]
-        if name == "$PI":
-            return PI
-        if name in KINDS_OF_CUT:
-            return KINDS_OF_CUT[name]
+        if name in CONSTANTS:
+            return CONSTANTS[name]
         if name.startswith("$"):
             return self.system.read(name, index, word)
         if name in self.system.axes() and not index:

@@ -6,8 +6,8 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.codes import GROUPS, PASSED_OVER, PASSED_OVER_CALLS
-from twin.programs.sinumerik.functions import Value, as_number, as_whole
-from twin.programs.sinumerik.syntax import Assignment, Invocation, Name, Part, Word
+from twin.programs.sinumerik.language.functions import Value, as_number, as_whole
+from twin.programs.sinumerik.language.syntax import Assignment, Invocation, Name, Part, Word
 from twin.programs.sinumerik.variables import Variables
 
 M_MAX: Final = 99_999_999

@@ -7,6 +7,7 @@ import pytest
 from tests.twin.programs.sinumerik.reading import ends, run
 from twin.errors import PartProgramError
 from twin.programs import Linear, Rapid, Settings
+from twin.programs.discovery import dialect_of
 
 
 def value_of(expression: str, before: str = "") -> float:
@@ -108,6 +109,7 @@ def test_arrays_are_filled_by_set_and_rep_and_read_by_index() -> None:
         ("G91\nBEGIN: G0 X1\nX2\nLAST: X3\nX4\nREPEAT BEGIN LAST P=1\nX10", [1.0, 3.0, 6.0, 10.0, 11.0, 13.0, 16.0, 26.0]),
         ("G91\nONE: G0 X1\nX5\nREPEATB ONE P=2\nX10", [1.0, 6.0, 7.0, 8.0, 18.0]),
         ("/G0 X1\n/3 X2\nX3", [1.0, 2.0, 3.0]),
+        ("DEF INT ONCE\nR1=R1+1\nG0 X=R1\nIF R1<2\nGOTOS\nENDIF", [1.0, 2.0]),
     ],
 )
 def test_blocks_are_run_in_the_order_of_the_control(text: str, ends_x: list[float]) -> None:
@@ -140,6 +142,7 @@ SUBPROGRAMS = {
         ("EXTERN SUB1(REAL,INT,VAR REAL)\nPCALL OPEN", [7.0]),
         ("KEEPS\nG0 X5", [5.0]),
         ("G0 X1\nMCALL L100\nX5\nY1\nMCALL\nX9", [1.0, 5.0, 6.0, 6.0, 7.0, 9.0]),
+        ("%_N_INNER_SPF\nX2\nM17\n%_N_MAIN_MPF\nG0 X1\nINNER\nM30", [1.0, 2.0]),
         ("%_N_MAIN_MPF\nG0 X1\nINNER\nM30\n%_N_INNER_SPF\nX2\nM17", [1.0, 2.0]),
     ],
 )
@@ -186,3 +189,20 @@ def test_a_comment_may_hold_anything_and_a_text_a_semicolon() -> None:
 
 def test_small_letters_read_as_capitals() -> None:
     assert ends(run("def real depth=3\ng0 x=depth\nr1=2 y=r1")) == [(3.0, 0.0, 0.0), (3.0, 2.0, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("text", "language"),
+    [
+        ("%_N_PART_MPF\nG1 X5", "sinumerik"),
+        ("G1 X=R1", "sinumerik"),
+        ('T="MILL"', "sinumerik"),
+        ("N10 MCALL CYCLE81(5,0,1,-5)", "sinumerik"),
+        ("G2 X5 CR=10", "sinumerik"),
+        ("O1 (SET X=100 F=5)\nG1 X5.", "fanuc"),
+        ("(TOOL R1=5 SOFT)\nG1 X5. F100.", "fanuc"),
+        ("; STOCK X=100 CR=5\nG21 G1 X5 F100", "fanuc"),
+    ],
+)
+def test_a_text_is_known_by_its_words_and_not_by_its_comments(text: str, language: str) -> None:
+    assert dialect_of(text).name == language

@@ -260,6 +260,8 @@ def test_surface_speed_follows_the_radius_up_to_its_limit() -> None:
         ("CYCLE832(0.05,13,0.2)\nCYCLE832(0.1,0)", [Tolerance(0, 0.05, 0.2), Tolerance(1, None)]),
         ("SOFT\nBRISK\nFFWON\nFFWOF", [JerkLimit(0, True), JerkLimit(1, False), FeedForward(2, True), FeedForward(3, False)]),
         ("M13", []),
+        ('CYCLE800()\nCYCLE800(0,"TC1",100000,57,0,0,0,0,0,0,0,0,0,-1)\nTRAFOOF', []),
+        ("CYCLE832(0.02,_ROUGH,1)", [Tolerance(0, 0.02)]),
     ],
 )
 def test_what_is_not_a_motion_is_put_out_as_it_is(text: str, expected: list[object]) -> None:

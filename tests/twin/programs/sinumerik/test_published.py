@@ -2,8 +2,8 @@
 
 Source: SINUMERIK 840D/840Di/810D Programming Guide Cycles, edition 11.02 (6FC5298-6AB40-0BP2), the example in each cycle's own
 section: 2.1 drilling cycles, 2.3 drilling patterns, 3 milling cycles; Programming Guide Fundamentals, edition 10.04, for arcs,
-frames and the pole. They are written down from knowledge of these manuals, without the printed page beside them: a figure of a call may
-differ from it; what such a call means does not. Edges beyond D1 are written D1, since the offset table has one edge a tool.
+frames and the pole. They are written down from knowledge of these manuals, without the printed page beside them: a figure of a
+call may differ from it; what such a call means does not. Edges beyond D1 are written D1, since the table has one edge a tool.
 """
 
 import math
@@ -251,7 +251,8 @@ def test_five_holes_about_a_pole_of_the_fundamentals() -> None:
 def test_a_contour_is_milled_at_three_shifted_and_turned_places() -> None:
     """Fundamentals, "ROT": the same subprogram at G54, shifted, and turned by 45° behind the shift."""
     moves = run(
-        "N10 G17 G54\nN20 TRANS X20 Y10\nN30 L10\nN40 TRANS X55 Y35\nN50 AROT RPL=45\nN60 L10\nN70 TRANS X20 Y40\nN80 AROT RPL=60\n"
+        "N10 G17 G54\nN20 TRANS X20 Y10\nN30 L10\nN40 TRANS X55 Y35\nN50 AROT RPL=45\nN60 L10\nN70 TRANS X20 Y40\n"
+        "N80 AROT RPL=60\n"
         "N90 L10\nN100 G0 X100 Y100\nN110 M30",
         Settings(programs={"L10": "N10 G0 X0 Y0\nN20 G1 X10 F100\nM17"}),
     )

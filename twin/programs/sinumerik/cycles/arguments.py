@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.functions import Value, as_number
+from twin.programs.sinumerik.language.functions import Value, as_number
 
 NEWER: Final = ("_UMODE", "_FS", "_ZFS", "_GMODE", "_DMODE", "_AMODE")
 """What newer screens put behind the parameters of a milling cycle. _DMODE is for the screen alone."""

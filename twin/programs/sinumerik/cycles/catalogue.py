@@ -8,9 +8,9 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik import compensation
 from twin.programs.sinumerik.cycles import deep_hole, drilling, face, patterns, pocket, slot, tapping
 from twin.programs.sinumerik.cycles.arguments import NEWER, Arguments
-from twin.programs.sinumerik.functions import Value
+from twin.programs.sinumerik.language.functions import Value
+from twin.programs.sinumerik.language.syntax import Invocation, Name
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.syntax import Invocation, Name
 
 DEPTH: Final = ("RTP", "RFP", "SDIS", "DP", "DPR")
 MODES: Final = ("_GMODE", "_DMODE", "_AMODE")
@@ -25,6 +25,32 @@ class Cycle:
     parameters: tuple[str, ...]
     run: Callable[[State, Arguments], None] | None = None
     pattern: Callable[[State, Arguments, Callable[[], None]], None] | None = None
+
+
+SWIVEL: Final = (
+    "_FR",
+    "_TC",
+    "_ST",
+    "_MODE",
+    "_X0",
+    "_Y0",
+    "_Z0",
+    "_A",
+    "_B",
+    "_C",
+    "_X1",
+    "_Y1",
+    "_Z1",
+    "_DIR",
+    "_FR_I",
+    "_DMODE",
+)
+SWIVELS: Final = "swivels the plane; the twin has no kinematics for it: three axes only"
+
+
+def swivel(state: State, given: Arguments) -> None:
+    """CYCLE800() swivels back, and one without retraction, shift and angle swivels nowhere: neither does anything here."""
+    given.only_zero("_FR", "_X0", "_Y0", "_Z0", "_A", "_B", "_C", "_X1", "_Y1", "_Z1", reason=SWIVELS)
 
 
 CYCLES: Final[Mapping[str, Cycle]] = {
@@ -114,12 +140,12 @@ CYCLES: Final[Mapping[str, Cycle]] = {
         face.face,
     ),
     "CYCLE832": Cycle(()),
+    "CYCLE800": Cycle(SWIVEL, swivel),
 }
 
-SWIVELS: Final = "swivels the plane; the twin has no kinematics for it: three axes only"
 CONTOUR_POCKET: Final = "contour milling of the cycle's own is not read; have the CAM system put out the path"
 REFUSED_CYCLES: Final[Mapping[str, str]] = {
-    **dict.fromkeys(("CYCLE800", "CYCLE800_", "CYCLE996", "CYCLE9960"), SWIVELS),
+    **dict.fromkeys(("CYCLE996", "CYCLE9960"), SWIVELS),
     **dict.fromkeys(("CYCLE60", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE72", "CYCLE73", "CYCLE74", "CYCLE75"), CONTOUR_POCKET),
     **dict.fromkeys(("CYCLE76", "CYCLE77", "CYCLE79"), "spigots are not read; write the contour with G41 or G42"),
     **dict.fromkeys(("CYCLE70", "CYCLE90"), "thread milling is not read; write the helix with TURN="),

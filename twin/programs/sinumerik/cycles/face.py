@@ -12,7 +12,7 @@ from twin.programs.sinumerik.cycles.arguments import Arguments
 from twin.programs.sinumerik.cycles.levels import Levels, levels, to
 from twin.programs.sinumerik.cycles.milling import SMALL_MM, Shape, steps
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.tools import cutter_radius
+from twin.programs.sinumerik.tool import cutter_radius
 
 CUTS_MAX = 10_000
 

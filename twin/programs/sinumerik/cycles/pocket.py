@@ -25,7 +25,7 @@ from twin.programs.sinumerik.cycles.milling import (
     width,
 )
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.tools import cutter_radius
+from twin.programs.sinumerik.tool import cutter_radius
 
 APPROACH_MM: Final = 2.0
 HELIX_TURNS_MAX: Final = 10_000

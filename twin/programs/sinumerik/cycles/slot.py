@@ -16,7 +16,7 @@ from twin.programs.sinumerik.cycles.milling import SMALL_MM, Segment, Shape, ste
 from twin.programs.sinumerik.cycles.patterns import many
 from twin.programs.sinumerik.spindle import turn
 from twin.programs.sinumerik.state import State
-from twin.programs.sinumerik.tools import cutter_radius
+from twin.programs.sinumerik.tool import cutter_radius
 
 COMPLETE: Final = 0
 ROUGH: Final = 1

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.expressions import Expression, Reader, Variable, constant
-from twin.programs.sinumerik.syntax import (
+from twin.programs.sinumerik.language.expressions import Expression, Reader, Variable, constant
+from twin.programs.sinumerik.language.syntax import (
     Assignment,
     CallByName,
     Case,
@@ -20,7 +20,7 @@ from twin.programs.sinumerik.syntax import (
     Structure,
     Target,
 )
-from twin.programs.sinumerik.tokens import Kind
+from twin.programs.sinumerik.language.tokens import Kind
 
 DIRECTIONS: Final = frozenset({"GOTO", "GOTOF", "GOTOB", "GOTOC", "GOTOS"})
 TYPES: Final = frozenset({"REAL", "INT", "BOOL", "CHAR", "STRING", "AXIS"})

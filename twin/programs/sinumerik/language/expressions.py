@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.functions import (
+from twin.programs.sinumerik.language.functions import (
     FUNCTIONS,
     Value,
     as_number,
@@ -18,7 +18,7 @@ from twin.programs.sinumerik.functions import (
     is_true,
     operate,
 )
-from twin.programs.sinumerik.tokens import Kind, Token
+from twin.programs.sinumerik.language.tokens import Kind, Token
 
 OPERATORS_MAX: Final = 256
 """Operators of one block; a block of a control has 512 characters."""

@@ -7,8 +7,8 @@ import re
 from typing import Final, NamedTuple
 
 from twin.programs.refusal import RefusedError
-from twin.programs.sinumerik.syntax import Block
-from twin.programs.sinumerik.tokens import CAPITALS
+from twin.programs.sinumerik.language.syntax import Block
+from twin.programs.sinumerik.language.tokens import CAPITALS
 
 HEADER: Final = re.compile(r"[ \t]*+%[ \t]*+([A-Z0-9_]++)?+")
 HEAD: Final = re.compile(
@@ -50,7 +50,7 @@ def program_name(written: str) -> str:
 class Text:
     """A text as it came (`written`) and in capitals (`lines`). `blocks` holds what has been compiled so far, by line."""
 
-    __slots__ = ("blocks", "labels", "lines", "name", "programs", "sections", "spans", "written")
+    __slots__ = ("blocks", "labels", "lines", "main", "name", "programs", "sections", "spans", "written")
 
     def __init__(self, text: str, name: str | None) -> None:
         self.name = name
@@ -59,6 +59,7 @@ class Text:
         self.lines = unified.translate(CAPITALS).split("\n")
         self.blocks: dict[int, Block] = {}
         self.sections = sections(self.lines)
+        self.main = next((one for one in self.sections if one.start and is_main(self.lines[one.start - 1])), self.sections[0])
         self.programs = {section.name: section for section in reversed(self.sections) if section.name}
         self.labels: dict[int, dict[str, list[int]]] = {}
         self.spans: dict[int, dict[int, Span]] = {}
@@ -88,6 +89,11 @@ class Text:
                 word, "this structure is not whole: IF ENDIF, LOOP ENDLOOP, FOR ENDFOR, WHILE ENDWHILE, REPEAT UNTIL"
             )
         return spans[line]
+
+
+def is_main(header: str) -> bool:
+    """Return True for the header of a main program, `%_N_NAME_MPF`."""
+    return header.lstrip().startswith("%") and header.rstrip().endswith("_MPF")
 
 
 def sections(lines: list[str]) -> list[Section]:

@@ -5,10 +5,10 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-from twin.programs.sinumerik.expressions import Expression, Reader, Variable, constant
-from twin.programs.sinumerik.refused import FRAME_VARIABLES, REFUSED_WORDS, SYNCHRONISED
-from twin.programs.sinumerik.statements import STATEMENTS
-from twin.programs.sinumerik.syntax import (
+from twin.programs.sinumerik.language.expressions import Expression, Reader, Variable, constant
+from twin.programs.sinumerik.language.refused import FRAME_VARIABLES, REFUSED_WORDS, SYNCHRONISED
+from twin.programs.sinumerik.language.statements import STATEMENTS
+from twin.programs.sinumerik.language.syntax import (
     BLOCK_ADDRESSES,
     Assignment,
     Block,
@@ -20,7 +20,7 @@ from twin.programs.sinumerik.syntax import (
     Word,
     Words,
 )
-from twin.programs.sinumerik.tokens import Kind, Token, tokenise
+from twin.programs.sinumerik.language.tokens import Kind, Token, tokenise
 
 MODES: Final = frozenset({"AC", "IC", "DC", "ACP", "ACN"})
 EXTENDED: Final = re.compile(r"([A-Z])([0-9]+)")

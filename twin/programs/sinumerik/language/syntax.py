@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Final
 
-from twin.programs.sinumerik.expressions import Expression, Variable
+from twin.programs.sinumerik.language.expressions import Expression, Variable
 
 BLOCK_ADDRESSES: Final = frozenset(
     {"CR", "AR", "AP", "RP", "TURN", "CHF", "CHR", "RND", "RNDM", "FRC", "FRCM", "ANG", "ANG1", "ANG2", "SPOS", "SPOSA", "ADIS"}
