@@ -100,7 +100,7 @@ class Flow:
         if stem not in self.texts:
             text = self.settings.called_text(bare)
             if text is None:
-                raise RefusedError(word, f"the program {stem} is called, and {NOT_AT_HAND}")
+                raise RefusedError(word, f"there is no program {stem} here; {NOT_AT_HAND}")
             self.texts[stem] = Text(text, stem)
         return self.texts[stem]
 
