@@ -64,8 +64,7 @@ class Interpreter:
         if not self.flow.level.program:
             raise RefusedError("", "the subprogram ends without LBL 0")
         if not self.state.leave_program():
-            m_functions.end(self.state, "END PGM")
-            self.state.moves.pop()
+            m_functions.close(self.state)
 
 
 def interpret(text: str, settings: Settings | None = None) -> list[Move]:
