@@ -87,6 +87,9 @@ def set_modes(state: State, words: Words) -> None:
             compensation.refuse_inside(state, words.written[group])
             modal[group] = codes[group]
             if group == "plane":
+                if state.pending_angle is not None:
+                    raise RefusedError(words.written[group], "cannot stand between the two lines of an angle")
+                corners.abandoned(state)
                 state.tangent, state.pole.centre = None, (0.0, 0.0)
                 state.pole.radius_mm = state.pole.angle_deg = None
                 tool.set_length(state, words.written[group])

@@ -197,8 +197,10 @@ def test_a_corner_that_does_not_fit_or_has_no_cut_behind_it_is_refused() -> None
         run("G1 X10 RND=12 F100\nY10")
     with pytest.raises(PartProgramError, match="RND=2: the next motion has to be a cut"):
         run("G1 X10 RND=2 F100\nG0 Z5")
-    with pytest.raises(PartProgramError, match="RND=2: the next motion has to be a cut"):
-        run("G1 X10 RND=2 F100\nM30")
+    for behind in ("M30", "G18\nX20", "Z5", "TRANS X5", "CYCLE81(10,0,1,-5)"):
+        with pytest.raises(PartProgramError, match=r"RND=2|TRANS|CYCLE81"):
+            run(f"G1 X10 RND=2 F100\n{behind}")
+    assert [letter for letter, _ in cuts(run("G1 X10 RNDM=2 F100\nG18\nX20 Z5\nRNDM=0"))] == ["L", "L"]
 
 
 @pytest.mark.parametrize(
