@@ -1,8 +1,15 @@
 """Programs that a program calls and that stand in texts of their own."""
 
 from collections.abc import Sequence
+from typing import Final
 
 from twin.programs.canonical import Move
+
+NOT_AT_HAND: Final = (
+    "its text is not at hand: simulate, expect and program times look for it in the folder of the program that calls it, "
+    "optimise reads one text"
+)
+"""The end of the refusal of a call."""
 
 
 def with_line_elsewhere(moves: Sequence[Move], line: int) -> list[Move]:

@@ -11,7 +11,7 @@ from twin.programs.canonical import Move
 from twin.programs.settings import Settings
 from twin.programs.source import WordPlace
 
-RECOGNISED_CHARACTERS_MAX: Final = 100_000
+RECOGNISED_CHARACTERS_MAX: Final = 20_000
 """A language is told from the beginning of a text, up to here."""
 
 
@@ -78,6 +78,7 @@ class Dialect:
         taken. Gets at most `RECOGNISED_CHARACTERS_MAX` characters from the beginning of a text
     interpret: raises PartProgramError (line, word, reason) where the control would refuse a block, or it is not read
     speed_per_tool: the speed stands in the block that calls the tool, and in no other: the optimiser chooses one for each tool
+    blocks_are_numbered: the control numbers every block of a text, and names it by that number rather than by its line
     m_codes: M codes that have a meaning of their own in this language, which a machine builder's cannot take
     """
 
@@ -90,3 +91,4 @@ class Dialect:
     words: SourceWords
     m_codes: frozenset[int]
     speed_per_tool: bool = False
+    blocks_are_numbered: bool = False

@@ -2,12 +2,13 @@
 
 import importlib
 import pkgutil
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import PurePath
 
 from twin.errors import PartProgramError, TwinError
 from twin.programs.dialect import RECOGNISED_CHARACTERS_MAX, Dialect
 from twin.programs.settings import Settings
+from twin.programs.source import source_lines
 
 WORD_MAX = 24
 
@@ -46,29 +47,24 @@ def dialect_of(text: str, settings: Settings | None = None) -> Dialect:
     """
     if settings is not None and settings.dialect is not None:
         return named(settings.dialect)
-    head = text[:RECOGNISED_CHARACTERS_MAX]
-    sure = sorted(((one.recognises(head), one) for one in dialects().values()), key=lambda pair: -pair[0])
-    best, dialect = sure[0]
-    if best > 0.0 and best > sure[1][0] if len(sure) > 1 else best > 0.0:
-        return dialect
-    lines = text.splitlines()
+    certainties = _certainties(text[:RECOGNISED_CHARACTERS_MAX])
+    best = max(certainties.values())
+    surest = [name for name, certainty in certainties.items() if certainty == best]
+    if best > 0.0 and len(surest) == 1:
+        return dialects()[surest[0]]
+    lines = source_lines(text)
     first = next((at for at, line in enumerate(lines) if line.strip()), None)
     if first is None:
         return next(iter(dialects().values()))
     if best > 0.0:
-        like = " and ".join(one.name for certainty, one in sure if certainty == best)
-        reason = f"the language of this program can be {like}"
+        reason = f"the language of this program can be {' and '.join(surest)}"
     else:
         reason = f"the language of this program is none of those that are read: {known()}"
     word = lines[first].strip()[:WORD_MAX]
     raise PartProgramError(first + 1, word, f'{reason}; choose one with dialect = "..." in [control] of machine.toml')
 
 
-def by_suffix(name: str) -> tuple[Dialect, ...]:
-    """Return the languages whose files end as this one does.
-
-    >>> [one.name for one in by_suffix("PLATE.NC")]
-    ['fanuc']
-    """
-    suffix = PurePath(name).suffix.lower()
-    return tuple(one for one in dialects().values() if suffix in one.suffixes)
+@lru_cache(maxsize=256)
+def _certainties(head: str) -> dict[str, float]:
+    """How sure each language is of the beginning of a text."""
+    return {name: one.recognises(head) for name, one in dialects().items()}

@@ -4,7 +4,7 @@ import pytest
 
 from twin.errors import PartProgramError, TwinError
 from twin.programs import Settings, interpret
-from twin.programs.discovery import by_suffix, dialect_of, dialects, named
+from twin.programs.discovery import dialect_of, dialects, named
 
 
 def test_fanuc_is_found_in_its_folder() -> None:
@@ -29,8 +29,3 @@ def test_the_settings_decide_where_they_name_a_language() -> None:
     assert dialect_of("<?xml", Settings(dialect="fanuc")).name == "fanuc"
     with pytest.raises(TwinError, match=r"dialect 'mazatrol' is not known; known are fanuc \("):
         interpret("G1", Settings(dialect="mazatrol"))
-
-
-def test_a_suffix_tells_in_any_case() -> None:
-    assert [one.name for one in by_suffix("parts/PLATE.NC")] == ["fanuc"]
-    assert by_suffix("plate.pdf") == ()

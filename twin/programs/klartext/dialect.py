@@ -33,4 +33,5 @@ DIALECT = Dialect(
     words=words,
     m_codes=CODES,
     speed_per_tool=True,
+    blocks_are_numbered=True,
 )

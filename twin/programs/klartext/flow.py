@@ -6,14 +6,11 @@ four times; `CALL PGM` runs another text to its END PGM.
 
 from dataclasses import dataclass, field
 from pathlib import PureWindowsPath
-from typing import TYPE_CHECKING
 
+from twin.programs.called import NOT_AT_HAND
 from twin.programs.klartext.source import Text
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
-
-if TYPE_CHECKING:
-    from twin.programs.klartext.state import State
 
 
 @dataclass(slots=True)
@@ -90,32 +87,25 @@ class Flow:
         if not self.level.program:
             self.levels.pop()
 
-    def call_program(self, state: "State", name: str, word: str) -> None:
-        """CALL PGM: the text of that name, without folder and suffix."""
+    def enter(self, name: str, word: str, local: dict[int, float], unit_mm: float) -> None:
+        """CALL PGM: the text of that name; its caller gets back its local parameters and its unit."""
         text = self.find_program(name, word)
         self.deeper(word)
-        variables = state.variables
-        self.levels.append(Level(text, 0, program=True, caller_local=variables.local, caller_unit_mm=state.unit_mm))
-        variables.local = {}
+        self.levels.append(Level(text, 0, program=True, caller_local=local, caller_unit_mm=unit_mm))
 
     def find_program(self, name: str, word: str) -> Text:
-        """RefusedError where no text of that name is at hand."""
-        stem = PureWindowsPath(name.strip().strip('"').replace("/", "\\")).name
-        if stem.upper().endswith((".H", ".I")):
-            stem = stem[:-2]
-        if stem.upper() not in self.texts:
-            text = self.settings.called_text(stem)
+        """The text of a program, by its name without folder and suffix. RefusedError where it is not at hand."""
+        bare = PureWindowsPath(name.strip().strip('"').replace("/", "\\")).name
+        stem = bare[:-2] if bare.upper().endswith(".H") else bare
+        if stem not in self.texts:
+            text = self.settings.called_text(bare)
             if text is None:
-                raise RefusedError(word, f"there is no program {stem} with this one; its file has to lie beside it")
-            self.texts[stem.upper()] = Text(text, stem.upper())
-        return self.texts[stem.upper()]
+                raise RefusedError(word, f"there is no program {stem} here; {NOT_AT_HAND}")
+            self.texts[stem] = Text(text, stem)
+        return self.texts[stem]
 
-    def end_of_program(self, state: "State") -> bool:
-        """END PGM or the end of a text: back to the caller; False in the main program."""
+    def leave(self) -> Level | None:
+        """END PGM or the end of a text: back to the caller; returns what was left, None in the main program."""
         while not self.level.program:
             self.levels.pop()
-        if len(self.levels) == 1:
-            return False
-        level = self.levels.pop()
-        state.variables.local, state.unit_mm = level.caller_local, level.caller_unit_mm
-        return True
+        return self.levels.pop() if len(self.levels) > 1 else None

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from twin.programs.klartext import appr_dep, compensation, functions, m_functions, path, tools
+from twin.programs.klartext import appr_dep, compensation, functions, m_functions, path, tool_calls
 from twin.programs.klartext.cycles import calling, coordinates, defining, patterns, special
 from twin.programs.klartext.numbers import value
 from twin.programs.klartext.source import Source
@@ -117,7 +117,7 @@ def call_program(source: Source) -> Command:
         chosen = state.selected if selected else resolved(state, name)
         if not chosen:
             raise RefusedError("CALL PGM", "needs the name of a program")
-        state.flow.call_program(state, chosen, chosen)
+        state.call_program(chosen, chosen)
 
     return run
 
@@ -151,7 +151,7 @@ def begin_program(source: Source) -> Command:
 
 def end_program(source: Source) -> Command:
     def run(state: State) -> None:
-        if not state.flow.end_of_program(state):
+        if not state.leave_program():
             m_functions.end(state, "END PGM")
 
     return run
@@ -172,8 +172,8 @@ def cycl_call(source: Source) -> Command:
 
 HEADS: Final[tuple[tuple[str, Callable[[Source], Command]], ...]] = (
     ("FN", functions.function),
-    ("TOOL CALL", lambda source: tools.call(source, len("TOOL CALL"))),
-    ("TOOL DEF", lambda source: tools.define(source, len("TOOL DEF"))),
+    ("TOOL CALL", lambda source: tool_calls.call(source, len("TOOL CALL"))),
+    ("TOOL DEF", lambda source: tool_calls.define(source, len("TOOL DEF"))),
     ("CYCL DEF", defining.cycl_def),
     ("CYCL CALL", cycl_call),
     ("CALL LBL", call_label),

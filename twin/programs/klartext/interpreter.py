@@ -7,9 +7,7 @@ kept, so that loops cost no more than they should.
 from twin.errors import PartProgramError
 from twin.programs.canonical import Move
 from twin.programs.klartext import m_functions, plain
-from twin.programs.klartext.flow import Flow
 from twin.programs.klartext.heads import Command, compiled
-from twin.programs.klartext.source import Text
 from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
@@ -22,8 +20,8 @@ class Interpreter:
 
     def __init__(self, text: str, settings: Settings) -> None:
         self.settings = settings
-        self.state = State(settings)
-        self.flow = self.state.flow = Flow(Text(text, None), settings)
+        self.state = State(text, settings)
+        self.flow = self.state.flow
         self.commands: dict[str | None, dict[int, Command]] = {}
         self.blocks_run = 0
 
@@ -65,9 +63,8 @@ class Interpreter:
         """The last block is passed: END PGM is missing, which the twin does not mind in the main program."""
         if not self.flow.level.program:
             raise RefusedError("", "the subprogram ends without LBL 0")
-        if not self.flow.end_of_program(self.state):
-            m_functions.end(self.state, "END PGM")
-            self.state.moves.pop()
+        if not self.state.leave_program():
+            m_functions.close(self.state)
 
 
 def interpret(text: str, settings: Settings | None = None) -> list[Move]:

@@ -96,8 +96,14 @@ def end(state: State, text: str) -> None:
     """The program ends here. In a called program it may not: the control refuses M2 and M30 there."""
     if state.flow.in_called_program and text.startswith("M"):
         raise RefusedError(text, "cannot stand in a program that CALL PGM calls; END PGM returns from it")
+    close(state)
+    state.emit(ProgramEnd(state.line, state.program))
+
+
+def close(state: State) -> None:
+    """Put out what was kept back; nothing runs any more."""
     compensation.finish(state)
     if state.corner is not None:
-        raise RefusedError(state.corner.text, "the program ends; a corner needs a move behind it")
-    state.emit(ProgramEnd(state.line, state.program))
+        place = (state.corner.line, state.program)
+        raise RefusedError(state.corner.text, "the program ends; a corner needs a move behind it", place)
     state.flow.ended = True

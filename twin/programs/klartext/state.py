@@ -5,19 +5,18 @@ It is the one thing that changes while a program runs; functions of the other fi
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from twin.programs.canonical import Motion, Move, Position, ToolLength
 from twin.programs.cutter_path import CompensatedSection
+from twin.programs.klartext.cycles.definition import Definition
+from twin.programs.klartext.flow import Flow
 from twin.programs.klartext.frame import Frame
+from twin.programs.klartext.source import Text
 from twin.programs.klartext.variables import Variables
 from twin.programs.planes import PLANES
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings, ToolOffset
-
-if TYPE_CHECKING:
-    from twin.programs.klartext.cycles.definition import Definition
-    from twin.programs.klartext.flow import Flow
 
 MM_PER_INCH: Final = 25.4
 INCH_FEED: Final = MM_PER_INCH / 10.0
@@ -118,10 +117,9 @@ class State:
         "variables",
     )
 
-    flow: "Flow"
-
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, text: str, settings: Settings) -> None:
         self.settings = settings
+        self.flow = Flow(Text(text, None), settings)
         self.axes = settings.axes
         self.frame = Frame(settings)
         self.variables = Variables(settings.parameters, self.system_parameter)
@@ -226,6 +224,19 @@ class State:
         """TOOL DEF with figures: a line of the tool table."""
         before = self.tool_offsets.get(number, ToolOffset())
         self.tool_offsets[number] = replace(before, length_mm=length_mm, radius_mm=radius_mm)
+
+    def call_program(self, name: str, word: str) -> None:
+        """CALL PGM: another text goes on, with local parameters of its own."""
+        self.flow.enter(name, word, self.variables.local, self.unit_mm)
+        self.variables.local = {}
+
+    def leave_program(self) -> bool:
+        """Back to the caller; False in the main program."""
+        left = self.flow.leave()
+        if left is None:
+            return False
+        self.variables.local, self.unit_mm = left.caller_local, left.caller_unit_mm
+        return True
 
     def system_parameter(self, number: int) -> float | None:
         """Q108 … Q114, as the control fills them (User's Manual TNC 640, "Preassigned Q parameters")."""

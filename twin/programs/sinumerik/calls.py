@@ -2,13 +2,14 @@
 
 from typing import Final
 
+from twin.programs.called import NOT_AT_HAND
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.flow import Flow, Level
 from twin.programs.sinumerik.language.expressions import Expression, Variable
 from twin.programs.sinumerik.language.syntax import Procedure
 from twin.programs.sinumerik.language.text import Section, Text
 
-UNKNOWN: Final = "there is no such subprogram, cycle or G code here; a subprogram's text has to be given with the program"
+UNKNOWN: Final = f"there is no such subprogram, cycle or G code here; if it is a subprogram, {NOT_AT_HAND}"
 
 
 def find(flow: Flow, name: str) -> tuple[Text, Section] | None:

@@ -1,13 +1,15 @@
 """CYCL DEF: which cycle a definition is, and what it does when it is read."""
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from typing import Final
 
 from twin.programs.klartext import compensation
 from twin.programs.klartext.cycles import coordinates, patterns, special
-from twin.programs.klartext.cycles.definition import Cycle, evaluated, parameters
-from twin.programs.klartext.cycles.running import MACHINING
+from twin.programs.klartext.cycles.definition import Definition, parameters
+from twin.programs.klartext.cycles.running import MACHINING, Cycle
+from twin.programs.klartext.numbers import Expression
 from twin.programs.klartext.source import Source
 from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
@@ -63,6 +65,19 @@ def cycl_def(source: Source) -> Callable[[State], None]:
     text = f"CYCL DEF {number}" + ("" if part is None else f".{part}")
     reason = WHY_NOT.get(number, f"this cycle is not read; read are {known()}")
     return lambda state: refuse(text, reason)
+
+
+def evaluated(state: State, number: int, given: Mapping[int, tuple[Expression, str, int]]) -> Definition:
+    """The definition with its values; those with a number are Q parameters of the program as well."""
+    values = {}
+    for parameter, (expression, _, line) in given.items():
+        try:
+            values[parameter] = expression(state.variables)
+        except RefusedError as refused:
+            raise RefusedError(refused.word, refused.reason, (line, state.program)) from None
+        if math.isfinite(values[parameter]):
+            state.variables.write("Q", parameter, values[parameter])
+    return Definition(number, values, state.unit_mm, state.feed_unit, state.tool.feed_mm_min)
 
 
 def refuse(text: str, reason: str) -> None:

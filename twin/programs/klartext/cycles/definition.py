@@ -2,13 +2,12 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 from twin.programs.klartext.numbers import VALUE, Expression, value
 from twin.programs.klartext.source import Source
-from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
 
 PARAMETER: Final = re.compile(
@@ -137,20 +136,3 @@ def parameters(source: Source, begin: int) -> dict[int, tuple[Expression, str, i
                 found[number] = (value(match.group(2), text), text, part.line)
             at = match.end()
     return found
-
-
-def evaluated(state: State, number: int, given: Mapping[int, tuple[Expression, str, int]]) -> Definition:
-    """The definition with its values; those with a number are Q parameters of the program as well."""
-    values = {}
-    for parameter, (expression, _, line) in given.items():
-        try:
-            values[parameter] = expression(state.variables)
-        except RefusedError as refused:
-            raise RefusedError(refused.word, refused.reason, (line, state.program)) from None
-        if math.isfinite(values[parameter]):
-            state.variables.write("Q", parameter, values[parameter])
-    return Definition(number, values, state.unit_mm, state.feed_unit, state.tool.feed_mm_min)
-
-
-Cycle = Callable[[State, Definition], None]
-"""What a cycle does where the tool is."""

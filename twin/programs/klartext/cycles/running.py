@@ -1,13 +1,16 @@
 """The machining cycles by number, and how a defined one is run where the tool is."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from twin.programs.klartext import compensation
 from twin.programs.klartext.cycles import boring, drilling, milling, tapping
-from twin.programs.klartext.cycles.definition import Cycle, Definition
+from twin.programs.klartext.cycles.definition import Definition
 from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
+
+Cycle = Callable[[State, Definition], None]
+"""What a cycle does where the tool is."""
 
 MACHINING: Final[Mapping[int, Cycle]] = {
     200: drilling.drilling,
@@ -37,7 +40,7 @@ def run_cycle(state: State, cycle: Definition) -> None:
     if state.frame.angle_deg != 0.0 and state.frame.plane != state.plane:
         raise RefusedError(cycle.text, "needs the plane of cycle 10")
     if cycle.number == 12:
-        state.flow.call_program(state, cycle.name, cycle.name)
+        state.call_program(cycle.name, cycle.name)
         return
     rpm = state.rpm
     MACHINING[cycle.number](state, cycle)
