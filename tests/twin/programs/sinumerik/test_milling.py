@@ -222,5 +222,11 @@ def test_a_face_is_cut_in_equal_lines(way: int, expected: list[tuple[float, floa
     assert [place for place, before in zip(level, [None, *level], strict=False) if place != before] == expected
 
 
+def test_a_face_is_passed_along_by_fdp_and_across_by_fdp1() -> None:
+    moves = of_cycle("CYCLE71(10,0,2,-4,0,0,40,30,0,4,16,15,0,500,31,2)", 10.0)
+    level = [place[:2] for letter, place in cuts(moves) if place[2] == -4.0 and letter == "L"]
+    assert level == [(55.0, 6.0), (55.0, 22.0), (-15.0, 22.0)]  # The last middle is 30 + 2 - 10 across.
+
+
 def test_a_face_goes_down_in_equal_infeeds_to_its_allowance() -> None:
     assert levels(of_cycle("CYCLE71(10,0,2,-11,0,0,40,30,0,6,16,0,1,500,31,0)", 10.0)) == [-5.0, -10.0]
