@@ -5,14 +5,15 @@ from collections.abc import Callable
 from typing import Final
 
 from twin.programs.arcs import Point
-from twin.programs.canonical import Linear, Motion
+from twin.programs.canonical import Linear, Motion, Position
+from twin.programs.cutter_path import REACH_MM
 from twin.programs.klartext import compensation, m_functions, motion
 from twin.programs.klartext.approach import depart
 from twin.programs.klartext.block import Block, parse
 from twin.programs.klartext.source import Source
 from twin.programs.klartext.state import Approach, State
 from twin.programs.pieces import in_plane, piece
-from twin.programs.planar import tangent
+from twin.programs.planar import extent, tangent
 from twin.programs.refusal import RefusedError
 
 SHAPES: Final = frozenset({"LEN", "CCA", "R"})
@@ -61,9 +62,7 @@ def approach(state: State, block: Block, kind: str, polar: bool) -> None:
     start_rapid, start_feed = state.last_rapid, (0.0, None) if state.last_rapid or kind == "LCT" else state.feed()
     rapid = motion.take_feed(state, block)
     end = motion.polar_target(state, block)[0] if polar else motion.target(state, block)
-    here = list(end)
-    here[state.normal] = state.position[state.normal]
-    depth = end[state.normal] if end[state.normal] != here[state.normal] else None
+    depth = changed_height(state, end)
     rest = motion.straight_move(state, end, rapid)
     first: Motion = rest
     if kind != "LCT":
@@ -93,7 +92,7 @@ def departure(state: State, block: Block, kind: str, polar: bool) -> None:
     target = motion.polar_target(state, block)[0] if polar else motion.target(state, block)
     if kind == "LCT":
         goal = in_plane(target, state.plane)
-    depth = target[state.normal] if target[state.normal] != state.position[state.normal] else None
+    depth = changed_height(state, target)
     size, angle = figures(state, block, kind, "DEP")
     rest = motion.straight_move(state, state.position, rapid)
     begin = len(state.moves)
@@ -106,12 +105,19 @@ def departure(state: State, block: Block, kind: str, polar: bool) -> None:
     m_functions.after(state, block.m)
 
 
+def changed_height(state: State, end: Position) -> float | None:
+    """The height of the tool's axis at the end of a block; None where it stays."""
+    height = end[state.normal]
+    return None if height == state.position[state.normal] else height
+
+
 def left_contour(state: State) -> Point:
     """The direction in which the tool leaves the contour, which ends here."""
     found = compensation.finish(state)
     if found is not None:
         return found
-    if state.last is None:
-        raise RefusedError("DEP", "needs a contour before it")
-    programmed = piece(state.last[0], state.last[1], state.plane)
-    return tangent(programmed, programmed.end)
+    if state.last is not None:
+        programmed = piece(state.last[0], state.last[1], state.plane)
+        if extent(programmed) > REACH_MM:
+            return tangent(programmed, programmed.end)
+    raise RefusedError("DEP", "needs a contour in the working plane just before it")

@@ -34,7 +34,6 @@ AFTER_M: Final[Mapping[int, frozenset[str]]] = {
     140: frozenset({"MB", "F"}),
 }
 """Words that belong to the M function that they follow, not to the block."""
-COUNTS: Final = frozenset("XYZABCUVW")
 
 
 class FeedKind(Enum):

@@ -7,7 +7,7 @@ corners it goes on an arc (User's Manual TNC 640, "Tool radius compensation").
 from itertools import pairwise
 
 from twin.programs.arcs import Point
-from twin.programs.canonical import Motion, Move, Position
+from twin.programs.canonical import Linear, Motion, Move, Position, Rapid
 from twin.programs.cutter_path import REACH_MM, CompensatedSection, Side, collect, join, put_out
 from twin.programs.klartext.approach import draw
 from twin.programs.klartext.state import State
@@ -85,11 +85,22 @@ def finish(state: State) -> Point | None:
         if at == 0 and approach is not None:
             direction = tangent(sides[1].shifted, sides[1].begin)
             position = draw(state.moves, approach, position, side.end, direction, section.plane)
-            state.moves.extend(side.events)
+            position = put_events(state.moves, side, position, section.plane)
         else:
             position = put_out(state.moves, side, position, section.plane)
     state.position = placed(state.position, in_plane(position, section.plane), section.plane)
     return leaving(sides)
+
+
+def put_events(out: list[Move], side: Side, position: Position, plane: int) -> Position:
+    """What came between APPR and its contour: moves of the tool's axis stay beside the first point."""
+    for event in side.events:
+        if isinstance(event, Rapid | Linear):
+            position = placed(event.end_mm, side.end, plane)
+            out.append(event._replace(end_mm=position))
+        else:
+            out.append(event)
+    return position
 
 
 def leaving(sides: list[Side]) -> Point | None:

@@ -7,7 +7,7 @@ from typing import Final
 from twin.programs.klartext import appr_dep, compensation, functions, m_functions, path, tool_calls
 from twin.programs.klartext.cycles import calling, coordinates, defining, patterns, special
 from twin.programs.klartext.numbers import value
-from twin.programs.klartext.source import Source
+from twin.programs.klartext.source import Source, unit_of
 from twin.programs.klartext.state import MM_PER_INCH, State
 from twin.programs.refusal import RefusedError
 
@@ -22,7 +22,6 @@ CALL: Final = re.compile(
 CYCL_CALL: Final = re.compile(r"CYCL CALL(?:[ \t]++(POS|PAT)(?![A-Z]))?+")
 ASSIGNED: Final = re.compile(r"(?:DECLARE STRING[ \t]++)?+Q[LRS]?+[0-9]++[ \t]*+=")
 M_ALONE: Final = re.compile(r"M[0-9]")
-UNIT: Final = re.compile(r"(?:BEGIN|END) PGM[ \t]*+.*?(?<![A-Z])(MM|INCH)[ \t]*")
 NOT_READ: Final = (
     ("FL", "free contour programming (FK) is not read; let the control or CAM write out its moves"),
     ("FC", "free contour programming (FK) is not read; let the control or CAM write out its moves"),
@@ -138,10 +137,10 @@ def select_program(source: Source) -> Command:
 
 def begin_program(source: Source) -> Command:
     """BEGIN PGM: its unit holds for the program."""
-    match = UNIT.fullmatch(source.body)
-    if match is None:
+    word = unit_of(source.body)
+    if word is None:
         raise RefusedError(source.written[:32], "is written BEGIN PGM NAME MM or BEGIN PGM NAME INCH")
-    unit = MM_PER_INCH if match.group(1) == "INCH" else 1.0
+    unit = MM_PER_INCH if word == "INCH" else 1.0
 
     def run(state: State) -> None:
         state.unit_mm = unit

@@ -16,7 +16,6 @@ COMMENT: Final = re.compile(r"[^;\"]*+(?:\"[^\"]*+\"?+[^;\"]*+)*+")
 CYCLE: Final = re.compile(r"(?:CYCL DEF|TCH PROBE)[ \t]++[0-9]++(?![.0-9])")
 PARAMETER_LINE: Final = re.compile(r"Q([0-9]++)[ \t]*+=[ \t]*+(?![^;]*[()*/^]|Q?[-+0-9.,]+[ \t]+[-+])")
 LABEL: Final = re.compile(r"LBL[ \t]*+(?:\"([^\"]*+)\"|([0-9]++))[ \t]*+")
-BEGIN: Final = re.compile(r"BEGIN PGM[ \t]*+(.*?)[ \t]*(MM|INCH)?")
 CYCLE_PARAMETER_MIN: Final = 200
 
 
@@ -41,27 +40,33 @@ class Source(NamedTuple):
 class Text:
     """A program: its name (None = the main program), its blocks, and which of them its labels are."""
 
-    __slots__ = ("inch", "labels", "name", "sources")
+    __slots__ = ("labels", "name", "sources")
 
     def __init__(self, text: str, name: str | None) -> None:
         self.name = name
         self.sources = blocks(text)
         self.labels: dict[str, int] = {}
-        self.inch: bool | None = None
         for at, source in enumerate(self.sources):
             if source.body.startswith("LBL"):
                 label = label_of(source)
                 if label is not None and label != "0":
                     self.labels.setdefault(label, at)
-            elif self.inch is None and source.body.startswith("BEGIN PGM"):
-                match = BEGIN.fullmatch(source.body)
-                self.inch = match is not None and match.group(2) == "INCH"
 
     def find(self, label: str, word: str) -> int:
         """The block of a label; RefusedError where there is none."""
         if label not in self.labels:
             raise RefusedError(word, f"there is no LBL {label} in this program")
         return self.labels[label]
+
+
+def unit_of(body: str) -> str | None:
+    """The last word of BEGIN PGM and END PGM, where it is a unit.
+
+    >>> unit_of("BEGIN PGM 2.5D MILLING INCH"), unit_of("BEGIN PGM A")
+    ('INCH', None)
+    """
+    last = body.rsplit(maxsplit=1)[-1]
+    return last if last in ("MM", "INCH") else None
 
 
 def label_of(source: Source) -> str | None:

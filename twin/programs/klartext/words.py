@@ -9,7 +9,7 @@ import re
 from typing import Final
 
 from twin.programs.klartext.block import WORD
-from twin.programs.klartext.source import CAPITALS, part_of
+from twin.programs.klartext.source import CAPITALS, part_of, unit_of
 from twin.programs.klartext.state import INCH_FEED
 from twin.programs.source import WordPlace
 
@@ -21,7 +21,6 @@ GOES: Final = re.compile(r"I?+(?:[XYZABCUVW]|P[RA])")
 TOOL_CALL: Final = re.compile(r"TOOL CALL(?:[ \t]++\"[^\"]*+\")?+")
 PLAIN: Final = re.compile(r"[-+]?[ \t]*[0-9.,]+")
 BRANCHES: Final = re.compile(r"/|LBL|CALL[ \t]|FN[ \t]*+(?:9|1[0-2])[ \t]*+:|STOP")
-UNIT: Final = re.compile(r"(?:BEGIN PGM)[ \t]*+.*?(?<![A-Z])(MM|INCH)[ \t]*+$")
 NUMBER: Final = re.compile(r"[ \t]*+N?+([0-9]++)(?=[ \t]|$)")
 OWNERS: Final = frozenset({103, 112, 124, 128, 140})
 """M functions that take F, T or A for themselves."""
@@ -170,9 +169,9 @@ def inch_lines(lines: list[str], inch: bool) -> list[bool]:
     """
     found = []
     for line in lines:
-        if "PGM" in line:
-            match = UNIT.match(_body(line)[0])
-            inch = match.group(1) == "INCH" if match is not None else inch
+        body = _body(line)[0] if "PGM" in line.translate(CAPITALS) else ""
+        unit = unit_of(body) if body.startswith("BEGIN PGM") else None
+        inch = inch if unit is None else unit == "INCH"
         found.append(inch)
     return found
 

@@ -101,6 +101,10 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
             "line 60 30 0 F300",
         ],
     ),
+    "down between APPR and its contour": (
+        ["APPR LT X+0 Y+0 LEN10 RL F100", "L Z-3 M8", "L X+50", "DEP LT LEN8"],
+        ["rapid -10 5 0", "line 0 5 0 F100", "coolant on", "line 0 5 -3 F100", "line 50 5 -3 F100", "line 58 5 -3 F100"],
+    ),
     "RND in a compensated contour": (
         ["L X+0 Y+0 RL F100", "L X+50", "RND R8 F40", "L Y+50", "L X+70 R0"],
         ["line 0 5 0 F100", "line 42 5 0 F100", "arc 45 8 0 about 42 8 sweep 90 F40", "line 45 50 0 F100", "line 70 50 0 F100"],
@@ -124,6 +128,7 @@ REFUSED: dict[str, tuple[list[str], int, str, str]] = {
         "RL or RR",
     ),
     "APPR without a contour": (["APPR LT X+0 Y+0 LEN10 RL F100", "DEP LT LEN8"], 4, "APPR", "needs a contour"),
+    "DEP without a contour": (["L Z-3 F100", "DEP LT LEN8"], 5, "DEP", "just before it"),
     "APPR LCT too near": (["APPR LCT X-20 Y-10 R10 RL F100", "L X+50", "L Y+20 R0"], 4, "APPR", "start further away"),
     "APPR without its length": (["APPR LT X+0 Y+0 RL F100"], 4, "APPR", "needs LEN"),
     "APPR CT without its angle": (["APPR CT X+0 Y+0 R5 RL F100"], 4, "APPR", "needs CCA"),
