@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.depth import examples
@@ -128,6 +128,7 @@ def test_the_way_in_may_go_to_and_fro() -> None:
     angle=st.floats(-180.0, 180.0),
     allowance=st.floats(0.0, 1.0),
 )
+@example(length=80.0, width=80.0, corner=5.0, step=9.5, angle=0.0, allowance=0.0)  # 8.75 apart they leave islands.
 def test_roughing_stays_inside_the_wall_and_leaves_nothing_standing(
     length: float, width: float, corner: float, step: float, angle: float, allowance: float
 ) -> None:
@@ -149,6 +150,10 @@ def test_roughing_stays_inside_the_wall_and_leaves_nothing_standing(
         for up in range(-4, 5):
             u, v = half_u * across / 4.5, half_v * up / 4.5
             assert min(off(way, (u, v)) for way in ways) <= radius + 1e-6
+    room = min(half_u, half_v)
+    for inset in (*(room * share / 20 for share in range(21)), min(radius + 0.1, room)):
+        # Along the diagonals, where the corners of the rings lie; just out of reach of the wall's ring they are furthest off.
+        assert min(off(way, (half_u - inset, half_v - inset)) for way in ways) <= radius + 1e-6
 
 
 def off(way: tuple[tuple[float, float], tuple[float, float]], point: tuple[float, float]) -> float:
