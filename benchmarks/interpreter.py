@@ -5,8 +5,8 @@
 
 The text is typical CAM output: `N… G1 X… Y… Z…` with an F now and then. All figures are CPU time, the best of the repeats: read
 the ratios, not the lines a second. rs274 is an outside process (on PATH, or where CNCTWIN_RS274 says, see
-tests/twin/gcode/rs274.py); its time includes its start and the printing of its calls. The bare `re.findall` finds the words and
-does nothing with them.
+tests/twin/programs/fanuc/rs274.py); its time includes its start and the printing of its calls. `re.findall` finds the words
+and does nothing with them.
 """
 
 import argparse
@@ -22,7 +22,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from twin.gcode import interpret
+from twin.programs import interpret
 
 WORD = re.compile(r"([A-Z])([-+]?[0-9.]+)")
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gcode import interpret
 from twin.machine import MachineFile
 from twin.motion.path import Path as ToolPath
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
+from twin.programs import interpret
 from twin.servo.constants import axis_constants
 
 Floats = NDArray[np.float64]

@@ -13,9 +13,9 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from twin.errors import MachineError
-from twin.gcode import Settings
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
+from twin.programs import Settings
 from twin.rotary import outside_name, outside_text
 from twin.rotary_tables import tables_inside
 

@@ -1,6 +1,6 @@
 """[control] of machine.toml: what the control of the machine makes of a program, beside the program's own text.
 
-The keys are those of `twin.gcode.Settings`, which says what they mean; what is left out is as there.
+The keys are those of `twin.programs.Settings`, which says what they mean; what is left out is as there.
 """
 
 from dataclasses import fields
@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from twin.errors import TwinError
-from twin.gcode import DwellUnit, IntegerWords, LeadIn, OffsetLookup, OutsideCorner, Settings, ToolOffset
-from twin.gcode.codes import M_CODES
+from twin.programs import DwellUnit, IntegerWords, LeadIn, OffsetLookup, OutsideCorner, Settings, ToolOffset
+from twin.programs.discovery import dialects, named
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -34,6 +34,7 @@ class ControlSection(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    dialect: str | None = None
     start_mm: Place | None = None
     inch: bool | None = None
     work_offsets_mm: dict[str, Place] = Field(default_factory=dict)
@@ -50,18 +51,21 @@ class ControlSection(BaseModel):
     scale_unit: Positive | None = None
     angle_signed: bool | None = None
     arc_radius_error_mm_max: Positive | None = None
-    block_skip: tuple[Annotated[int, Field(ge=1, le=9)], ...] = ()
+    block_skip: tuple[Annotated[int, Field(ge=0, le=9)], ...] = ()
     optional_stop: bool | None = None
     variables: dict[Annotated[str, Field(pattern=r"^[0-9]{1,5}$")], Finite] = Field(default_factory=dict)
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    tool_numbers: dict[str, Annotated[int, Field(ge=0, le=32_767)]] = Field(default_factory=dict)
     spindle_rpm_max: Positive | None = None
     builder_m_codes: tuple[Annotated[int, Field(ge=0, le=9999)], ...] = ()
 
     @model_validator(mode="after")
     def _can_be_set(self) -> "ControlSection":
-        for code in self.builder_m_codes:
-            if code in M_CODES:
-                raise ValueError(f"builder_m_codes has {code}: every control has M{code}, and it is not passed over")
         try:
+            languages = [named(self.dialect)] if self.dialect is not None else list(dialects().values())
+            for code in self.builder_m_codes:
+                if all(code in language.m_codes for language in languages):
+                    raise ValueError(f"builder_m_codes has {code}: every control has M{code}, and it is not passed over")
             self.settings()
         except TwinError as error:
             raise ValueError(str(error)) from None

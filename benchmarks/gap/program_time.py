@@ -26,10 +26,10 @@ from benchmarks.programs.plates import FITTED, PLATES, data_folder
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
 from twin.gap.programs.diagnose import diagnose_programs
-from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves
 from twin.motion.sampling import sampled
+from twin.programs import interpret
 from twin.recording.observations import last_values, read_observations
 from twin.recording.program_run import OVERRIDES, program_runs
 from twin.runlog import run_log, write_run

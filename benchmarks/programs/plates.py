@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.programs.spindle import SpindleRamp, run_ups, spindle_ramp
-from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
+from twin.programs import Settings, interpret
 from twin.recording.observations import last_values, read_observations
 from twin.recording.program_run import program_runs
 from twin.recording.recorded_program import NOMINAL, RecordedProgram

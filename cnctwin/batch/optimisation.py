@@ -12,6 +12,7 @@ from cnctwin.reports.optimisation.page import report_html
 from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 from twin.optimisation.optimise import Hooks, Progress, Spread, optimise
 from twin.optimisation.question import Question
+from twin.vocabulary.program_names import ENDINGS
 
 DEFAULTS = Question("", "")
 
@@ -75,7 +76,7 @@ def optimise_request(
     checkpoint: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Optimised:
-    """The answer to a request; optimised.nc, optimisation.json and report.html in the folder `out`.
+    """The answer to a request: optimised.nc (or with the program's own ending), optimisation.json, report.html in folder `out`.
 
     checkpoint: written after every epoch, and gone on with where it is there
 
@@ -83,8 +84,14 @@ def optimise_request(
     Stopped.
     """
     write(lambda: out.mkdir(parents=True, exist_ok=True), out)
-    files = Files(out / "optimised.nc", out / "optimisation.json", out / "report.html", request.encoding)
+    files = Files(out / f"optimised{_ending(request.name)}", out / "optimisation.json", out / "report.html", request.encoding)
     return run(request.question(), files, progress=progress, spread=spread, checkpoint=checkpoint, stop=stop)
+
+
+def _ending(name: str) -> str:
+    """Return the ending of a file with a part program; .nc where the name has none."""
+    suffix = Path(name).suffix
+    return suffix if suffix.casefold() in ENDINGS else ".nc"
 
 
 def run(

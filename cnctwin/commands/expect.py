@@ -10,6 +10,7 @@ from rich.table import Table
 
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_text import read_text
 from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
@@ -40,6 +41,7 @@ def expect(
         from twin.expected.files import written
         from twin.expected.making import expectation_of
         from twin.machine import machine_from_toml
+        from twin.simulator.simulation import program_settings
     text = read_text(machine)
     described = machine_from_toml(text, str(machine))
     if name is not None:
@@ -55,7 +57,10 @@ def expect(
             continue
         with working(f"working out {program.name}"):
             try:
-                made = expectation_of(described, source, table, program.stem, numbering=numbering, description=version)
+                settings = with_called_programs(program_settings(described), program, source)
+                made = expectation_of(
+                    described, source, table, program.stem, numbering=numbering, settings=settings, description=version
+                )
             except TwinError as error:
                 raise UsageError(f"{program}: {error}") from None
         shown.append(_shown(made, program, written(out, made), as_json=as_json))

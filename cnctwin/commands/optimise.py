@@ -24,9 +24,9 @@ from cnctwin.processes.stopping import stopped_by_signals
 if TYPE_CHECKING:
     import twin.optimisation.question as asked
     from cnctwin.batch.optimisation import Files
-    from twin.gcode import Settings
     from twin.machine import MachineFile
     from twin.optimisation.answer import Objective, Optimised, SpeedChanges
+    from twin.programs import Settings
 
 BINDS_SHOWN, FRONT_SHOWN = 6, 20
 

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.output import check_suffix, write
 from cnctwin.files.program_text import read_text
 from cnctwin.processes.extras import needed_by
@@ -32,13 +33,15 @@ def simulate(
         from cnctwin.batch.simulation import machine_to_simulate, summary_of
         from twin.errors import PartProgramError
         from twin.runlog import write_run
+        from twin.simulator.simulation import program_settings
         from twin.simulator.simulation import simulate as simulated
     described = machine_to_simulate(machine)
     check_suffix(out)
     text = read_text(program)
     with working("simulating"):
         try:
-            done = simulated(described, text, seed=seed, name=program.name)
+            settings = with_called_programs(program_settings(described), program, text)
+            done = simulated(described, text, seed=seed, settings=settings, name=program.name)
         except PartProgramError as error:
             raise UsageError(f"{program}: {error}") from None
         if out is not None:

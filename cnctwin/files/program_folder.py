@@ -7,8 +7,9 @@ from pathlib import Path
 
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
+from twin.vocabulary.program_names import ENDINGS
 
-SUFFIXES = ("", ".nc", ".mpf", ".spf", ".h", ".eia", ".min", ".tap", ".txt")
+SUFFIXES = ("", *ENDINGS)
 HEAD_CHARACTERS = 2000
 """A program names itself within so many."""
 _WORD = re.compile(r"^[%\s]*([O:]\s*0*\d+|BEGIN PGM \S+)", re.IGNORECASE | re.MULTILINE)

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.files.program_text import read_text
 from cnctwin.machines import disk
@@ -34,7 +35,8 @@ def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
     faults = []
     for path in sorted(files):
         try:
-            seconds = section_seconds(machine, read_text(path))
+            text = read_text(path)
+            seconds = section_seconds(machine, text, with_called_programs(machine.settings, path, text))
         except (TwinError, UsageError) as error:
             if machine.program is None:
                 raise

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.validation.block_bootstrap import bootstrapped
 from cnctwin.validation.budgets import Budgets
@@ -20,10 +21,10 @@ from twin.case import RunAtHand, RunEntry, RunKind
 from twin.errors import TwinError
 from twin.gap.programs.fit import REFERENCE_START_MM, Model, Watched
 from twin.gap.programs.trial import Trial, trial_of
-from twin.gcode import Settings, interpret
 from twin.motion.control import program_effects
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
+from twin.programs import Settings, interpret
 from twin.recording.program_run import OVERRIDES
 from twin.runlog import RunLog
 
@@ -134,7 +135,8 @@ def whole_of(log: RunLog, path: Path, control: ControlModel) -> Timed | str:
     if any(log.has(name) and float(np.nanmax(np.abs(log[name] - 100.0))) > 0.5 for name in OVERRIDES.values()):
         return "an override was turned"
     try:
-        moves = interpret(path.read_text(encoding="utf-8"), control.settings)
+        text = path.read_text(encoding="utf-8")
+        moves = interpret(text, with_called_programs(control.settings, path, text))
         planned = control.model.control.plan(path_from_moves(moves, control.settings.start_mm or None))
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return str(error)

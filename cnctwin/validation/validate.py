@@ -26,6 +26,7 @@ from cnctwin.validation.published import publish
 from sparkplug.broker import BrokerAddress
 from twin.machine import read_machine
 from twin.runlog import read_run
+from twin.vocabulary.program_names import ENDINGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +99,10 @@ def _of_runs(asked: ValidationRequest, twin: Twin, budgets: Budgets) -> list[tup
 
 
 def _beside(path: Path, cycles: Sequence[Cycle]) -> dict[str, Path]:
-    """The program of a run lies beside it: same name, ending .nc."""
-    text = path.with_suffix(".nc")
-    return dict.fromkeys(names_of(cycles), text) if text.is_file() else {}
+    """The program of a run lies beside it: same name, with the ending of a program."""
+    texts = (path.with_suffix(ending) for ending in ENDINGS)
+    text = next((one for one in texts if one.is_file()), None)
+    return {} if text is None else dict.fromkeys(names_of(cycles), text)
 
 
 def _of_store(asked: ValidationRequest, twin: Twin, budgets: Budgets, say: Any) -> list[tuple[Evidence, list[Figure]]]:

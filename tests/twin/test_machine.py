@@ -8,9 +8,9 @@ from tests.twin.axes import AXIS
 from twin.case import read_case
 from twin.effects.added import check_effects
 from twin.errors import CaseError, MachineError
-from twin.gcode import IntegerWords, Settings, ToolOffset
 from twin.machine import machine_from_toml, read_machine
 from twin.machine_toml import machine_to_toml
+from twin.programs import IntegerWords, Settings, ToolOffset
 
 HEAD = "[machine]\nname = 'a'\n"
 WHOLE = (
@@ -61,6 +61,9 @@ def test_the_force_of_an_ampere_comes_from_the_screw_or_is_stated() -> None:
         (HEAD + "[control]\nwork_offsets_mm = { G53 = [0.0, 0.0, 0.0] }", "work offset 'G53' is not known"),
         (HEAD + "[control]\nbuilder_m_codes = [13, 3]", "control: builder_m_codes has 3: every control has M3"),
         (HEAD + "[control]\nbuilder_m_code = [13]", "control.builder_m_code is not known"),
+        (HEAD + '[control]\ndialect = "mazatrol"', "control: dialect 'mazatrol' is not known; known are .*fanuc"),
+        (HEAD + '[control]\ndialect = "fanuc"\nbuilder_m_codes = [29]', "every control has M29"),
+        (HEAD + "[control]\nparameters = { V1 = 1.0 }", "parameter 'V1' is not known; names are such as Q1"),
         (HEAD + "[stock]\nmin_mm = [0, 0, 5]\nmax_mm = [1, 1, 5]", "is not below max_mm 5.0 in z"),
     ],
 )
@@ -109,6 +112,9 @@ work_offsets_mm = { G55 = [1.0, 2.0, 3.0] }
 references_mm = [[0.0, 0.0, 400.0]]
 integer_words = "increments"
 builder_m_codes = [13]
+dialect = "fanuc"
+parameters = { Q1 = 5.0, R10 = 2.0 }
+tool_numbers = { "MILL D10" = 5 }
 variables = { 500 = 2.5 }
 block_skip = [1]
 tool_offsets = { 7 = { length_mm = 100.0, length_wear_mm = -0.1 } }
@@ -121,12 +127,15 @@ tool_offsets = { 7 = { length_mm = 100.0, length_wear_mm = -0.1 } }
         references_mm=((0.0, 0.0, 400.0),),
         integer_words=IntegerWords.INCREMENTS,
         builder_m_codes=frozenset({13}),
+        dialect="fanuc",
+        parameters={"Q1": 5.0, "R10": 2.0},
+        tool_numbers={"MILL D10": 5},
         variables={500: 2.5},
         block_skip=frozenset({1}),
         tool_offsets={7: ToolOffset(length_mm=100.0, length_wear_mm=-0.1)},
     )
     assert machine_from_toml(machine_to_toml(machine)) == machine
-    without = {"axes", "subprograms"} | {name for name in Settings.__dataclass_fields__ if name.endswith("s_max")}
+    without = {"axes", "programs", "subprograms"} | {name for name in Settings.__dataclass_fields__ if name.endswith("s_max")}
     without |= {"call_depth_max", "bracket_depth_max"}
     assert set(type(machine.control).model_fields) == set(Settings.__dataclass_fields__) - without
 

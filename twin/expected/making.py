@@ -27,13 +27,15 @@ from twin.expected.forces import row_forces
 from twin.expected.lines import Numbering, numbering_of, numbers
 from twin.expected.meter import Meter
 from twin.expected.stretches import stretches_of
-from twin.gcode import Settings, interpret
 from twin.live.spindle import LiveSpindle
 from twin.machine import MachineFile, Tool
 from twin.motion.path import Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.optimisation.program import END_FACE_MM2
-from twin.optimisation.words import source_lines
+from twin.programs import Settings
+from twin.programs.called import with_line_elsewhere
+from twin.programs.discovery import dialect_of
+from twin.programs.source import source_lines
 from twin.simulator.simulation import program_plan, program_settings
 
 Floats = NDArray[np.float64]
@@ -67,15 +69,16 @@ def expectation_of(
     if tools:
         machine = machine.model_copy(update={"tools": {**machine.tools, **tools}})
     settings = program_settings(machine) if settings is None else settings
-    moves = [move if move.program is None else move._replace(line=OUTSIDE) for move in interpret(program_text, settings)]
-    source = source_lines(program_text)
-    numbering = numbering_of(source) if numbering is None else numbering
+    dialect = dialect_of(program_text, settings)
+    moves = with_line_elsewhere(dialect.interpret(program_text, settings), OUTSIDE)
+    source, block_number = source_lines(program_text), dialect.words.block_number
+    numbering = numbering_of(source, block_number) if numbering is None else numbering
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     notes: list[str] = []
     plan = program_plan(machine, path, notes)
     missing = Missing()
     given = _Given.of(machine, path, plan, notes, missing)
-    told = [*numbers(source, numbering), OUTSIDE]
+    told = [*numbers(source, numbering, block_number), OUTSIDE]
     runs = tuple(given.runs(told))
     meter = None
     if machine.spindle is not None:

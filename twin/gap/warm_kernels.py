@@ -11,11 +11,11 @@ import numpy as np
 from twin.effects.catalogue import catalogue
 from twin.effects.effect import Effect, On
 from twin.gap.stages.cut import acting
-from twin.gcode import interpret
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.machine import Program, SpindleDrive, Thermal
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
+from twin.programs import Settings, interpret
 from twin.sensor.reading import readings
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
@@ -27,7 +27,10 @@ def warm_kernels() -> None:
     _heat()
     _load()
     _sensors()
-    plan(path_from_moves(interpret(PROGRAM)), Program(rapid_mm_min=24000.0, acceleration_mm_s2=4000.0, jerk_mm_s3=8e4))
+    plan(
+        path_from_moves(interpret(PROGRAM, Settings(dialect="fanuc"))),
+        Program(rapid_mm_min=24000.0, acceleration_mm_s2=4000.0, jerk_mm_s3=8e4),
+    )
 
 
 def _constants(effects: tuple[Effect, ...]) -> dict[str, float]:

@@ -3,7 +3,10 @@
 The corner rule is that of FANUC's AI contour control (A-63512EN; permissible speed difference, parameter 1783): with unit
 tangents t⁻, t⁺ before and after a corner, the speed there is v ≤ min over axes of D_i / |t⁺_i − t⁻_i|. The other rule that
 controls use is by contour tolerance (junction deviation δ): with γ the angle between the two lines, v² ≤ a δ sin(γ/2) / (1 −
-sin(γ/2)). A limit that is infinite does not exist.
+sin(γ/2)). The circle that touches both lines and leaves the corner by δ has the radius r = δ sin(γ/2) / (1 − sin(γ/2)), and
+v² / r is the acceleration along the path there (S. K. Jeon, *Improving Grbl: cornering algorithm*, 2011). Where the program
+itself states a tolerance (HEIDENHAIN cycle 32, SINUMERIK CYCLE832), this rule with that tolerance alone decides. A limit that is
+infinite does not exist.
 """
 
 from dataclasses import dataclass, replace
@@ -120,7 +123,9 @@ def bounds(path: Path, limits: Limits) -> Bounds:
     speed[curved] = np.minimum(speed[curved], np.sqrt(_centripetal(path, limits)[curved] / curvature[curved]))
     if limits.block_time_s > 0.0:
         speed = np.where(rapid, speed, np.minimum(speed, path.length_mm / limits.block_time_s))
-    return Bounds(speed, acceleration, slowest(limits.jerk_mm_s3, rapid_jerk), _junctions(path, limits, acceleration, starting))
+    jerk = slowest(limits.jerk_mm_s3, rapid_jerk)
+    jerk[~path.jerk_limited] = np.inf
+    return Bounds(speed, acceleration, jerk, _junctions(path, limits, acceleration, starting))
 
 
 def _each_axis(value: PerAxis, path: Path) -> Floats:
@@ -166,10 +171,13 @@ def _junctions(path: Path, limits: Limits, acceleration: Floats, starting: Float
     jump = np.abs(after - before)
     allowed = _each_axis(limits.corner_speed_difference_mm_min, path) / 60.0
     junction[1:-1] = np.min(np.where(jump > 1e-9, allowed / np.maximum(jump, 1e-9), np.inf), axis=1)
+    slower = np.minimum(acceleration[:-1], acceleration[1:])
     if np.isfinite(limits.corner_deviation_mm):
-        junction[1:-1] = np.minimum(
-            junction[1:-1], _by_deviation(before, after, limits, np.minimum(acceleration[:-1], acceleration[1:]))
-        )
+        junction[1:-1] = np.minimum(junction[1:-1], _by_deviation(before, after, limits.corner_deviation_mm, slower))
+    # At the corner where a tolerance begins or ends, the tighter of the two holds, or the one that there is.
+    stated = np.fmin(path.tolerance_mm[:-1], path.tolerance_mm[1:])
+    if not np.isnan(stated).all():
+        junction[1:-1] = np.where(np.isnan(stated), junction[1:-1], _by_deviation(before, after, stated, slower))
     at_rest = path.exact_stop[:-1] | (rapid[:-1] ^ rapid[1:])
     if not limits.rapid_overlap:
         at_rest |= rapid[:-1] | rapid[1:]
@@ -180,11 +188,9 @@ def _junctions(path: Path, limits: Limits, acceleration: Floats, starting: Float
     return junction
 
 
-def _by_deviation(before: Floats, after: Floats, limits: Limits, acceleration: Floats) -> Floats:
+def _by_deviation(before: Floats, after: Floats, tolerance_mm: Floats | float, acceleration: Floats) -> Floats:
     """Speed (n − 1,) of the circle that leaves a corner by no more than the tolerance: cos γ = −t⁻·t⁺."""
     cosine = np.clip(-np.sum(before * after, axis=1), -1.0, 1.0)
     half = np.sqrt(0.5 * (1.0 - cosine))
     straight = half > 1.0 - 1e-12
-    return np.where(
-        straight, np.inf, np.sqrt(acceleration * limits.corner_deviation_mm * half / np.where(straight, 1.0, 1.0 - half))
-    )
+    return np.where(straight, np.inf, np.sqrt(acceleration * tolerance_mm * half / np.where(straight, 1.0, 1.0 - half)))

@@ -4,7 +4,7 @@ A line of length L from p₀ to p₁ is p(s) = p₀ + (p₁ − p₀) s / L. An 
 second axis (u, v) is, with the fraction f = s / L, p_u = c_u + r(f) cos(φ₀ + θ f), p_v = c_v + r(f) sin(φ₀ + θ f); the axes
 outside the plane move with f (helix). r(f) goes linearly from the radius of the start to that of the end, which differ by the
 rounding of the program, so that the end is met exactly; L = √((r θ)² + h²) with the mean radius r and the helix height h.
-The planes are those of `twin.gcode.planes`. A sweep is positive counter-clockwise seen from the positive normal of its plane.
+The planes are those of `twin.programs.planes`. A sweep is positive counter-clockwise seen from the positive normal of its plane.
 """
 
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gcode import canonical
-from twin.gcode.planes import PLANES
 from twin.motion.geometry import Segments, curvature_at, points_at, tangents_at
+from twin.programs import canonical
+from twin.programs.planes import PLANES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,6 +68,8 @@ class Path:
     start_mm, end_mm: (n, axes); centre_mm: (n, axes), of use for arcs only
     plane_axes: (n, 2) first and second axis of the plane; sweep_rad: 0 for what is no arc
     exact_stop: (n,) the segment ends at rest (G61, G9)
+    tolerance_mm: (n,) the contour tolerance that the program states there; NaN = none, the machine's own corner rule holds
+    jerk_limited: (n,) False where the program has switched the jerk limit off (BRISK)
     tool_mm: (n, 2) length of the tool in z, as the control counts it, at the start and at the end of each segment; they differ
         where the segment takes up another one
     line: (n,) source line
@@ -84,6 +86,8 @@ class Path:
     length_mm: Floats
     feed_mm_min: Floats
     exact_stop: NDArray[np.bool_]
+    tolerance_mm: Floats
+    jerk_limited: NDArray[np.bool_]
     tool_mm: Floats
     events: tuple[Event, ...]
 
@@ -139,7 +143,7 @@ class _Builder:
         self.rows: list[tuple[float, ...]] = []
         self.points: list[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = []
         self.events: list[Event] = []
-        self.exact_stop = False
+        self.exact_stop, self.jerk_limited, self.tolerance_mm = False, True, np.nan
         self.tool_mm = self.tool_before_mm = 0.0
 
     def event(self, kind: EventKind, value: float, line: int) -> None:
@@ -160,7 +164,8 @@ class _Builder:
         length = _length(start, end, centre, plane, sweep)
         if length < SHORTEST_MM:
             return
-        self.rows.append((line, kind, plane, sweep, length, feed, self.exact_stop, tool_before, self.tool_mm))
+        modes = (self.exact_stop, self.tolerance_mm, self.jerk_limited)
+        self.rows.append((line, kind, plane, sweep, length, feed, *modes, tool_before, self.tool_mm))
         self.points.append((start, end, centre or start))
 
 
@@ -198,7 +203,7 @@ def path_from_moves(
     builder = _Builder(start_mm if start_mm is not None else (0.0,) * len(axes), tool_change_mm)
     for move in moves:
         _add(builder, move)
-    rows = np.array(builder.rows, dtype=np.float64).reshape(-1, 9)
+    rows = np.array(builder.rows, dtype=np.float64).reshape(-1, 11)
     points = np.array(builder.points, dtype=np.float64).reshape(-1, 3, len(axes))
     return Path(
         axes=axes,
@@ -212,7 +217,9 @@ def path_from_moves(
         length_mm=rows[:, 4].copy(),
         feed_mm_min=rows[:, 5].copy(),
         exact_stop=rows[:, 6].astype(np.bool_),
-        tool_mm=rows[:, 7:].copy(),
+        tolerance_mm=rows[:, 7].copy(),
+        jerk_limited=rows[:, 8].astype(np.bool_),
+        tool_mm=rows[:, 9:].copy(),
         events=tuple(builder.events),
     )
 
@@ -248,3 +255,9 @@ def _add(builder: _Builder, move: canonical.Move) -> None:
             builder.exact_stop = move.on
         case canonical.LookAhead():
             pass  # The planner looks ahead over the whole program in either state.
+        case canonical.Tolerance():
+            builder.tolerance_mm = np.nan if move.contour_mm is None else move.contour_mm
+        case canonical.JerkLimit():
+            builder.jerk_limited = move.limited
+        case canonical.FeedForward():
+            pass  # The feed-forward of the simulated servo is the machine's, for the whole run.

@@ -69,7 +69,7 @@ def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rap
 
     1200 mm at 6000 mm/min with 1000 mm/s² take 12 s and another v/a = 0.1 s to start and stop:
 
-    >>> from twin.gcode.canonical import Linear
+    >>> from twin.programs.canonical import Linear
     >>> from twin.motion.path import path_from_moves
     >>> line = path_from_moves([Linear(0, (1200.0, 0.0, 0.0), 6000.0, None)])
     >>> round(plan(line, Limits(rapid_mm_min=10000.0, acceleration_mm_s2=1000.0)).total_s, 9)

@@ -1,15 +1,15 @@
 """The sections of a program between its tool changes, and how long the twin says that each takes."""
 
 from twin.errors import MachineError
-from twin.gcode import interpret
 from twin.machine import MachineFile
 from twin.motion.control import control_of
 from twin.motion.path import EventKind, path_from_moves
+from twin.programs import Settings, interpret
 
 
-def section_seconds(machine: MachineFile, text: str) -> tuple[float, ...]:
+def section_seconds(machine: MachineFile, text: str, settings: Settings | None = None) -> tuple[float, ...]:
     """Return the seconds of each section of a program, from its start, or the end of a tool change, to the next tool change, or
-    its end. The tool changes themselves are in none.
+    its end. The tool changes themselves are in none. settings: None = those of the machine
 
     Raises MachineError where the machine states nothing of how its control moves, PartProgramError where the text is no program.
 
@@ -23,8 +23,9 @@ def section_seconds(machine: MachineFile, text: str) -> tuple[float, ...]:
     """
     if machine.program is None:
         raise MachineError(f"{machine.machine.name}: [program] is missing; it states how the control moves")
-    moves = interpret(text, machine.settings)
-    plan = control_of(machine, machine.program).plan(path_from_moves(moves, machine.settings.start_mm or None))
+    settings = machine.settings if settings is None else settings
+    moves = interpret(text, settings)
+    plan = control_of(machine, machine.program).plan(path_from_moves(moves, settings.start_mm or None))
     seconds, begun_s = [], 0.0
     for event, at_s, lasts_s in zip(plan.path.events, plan.event_start_s.tolist(), plan.event_duration_s.tolist(), strict=True):
         if event.kind is EventKind.TOOL_CHANGE:

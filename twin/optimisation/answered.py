@@ -20,7 +20,7 @@ from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, s
 from twin.optimisation.speeds.notes import speed_notes
 from twin.optimisation.speeds.stretches import changes_in_material
 from twin.optimisation.uncertainty import PRICED, sensitivity
-from twin.optimisation.words import source_lines
+from twin.programs.source import source_lines
 
 
 def answered(
@@ -61,7 +61,7 @@ def answered(
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
         collisions=made.program.collisions,
-        speed_changes=question.speed_changes,
+        speed_changes=made.groups.changes,
         changes_in_material=len(changes_in_material(made.program, text.path)),
     )
 

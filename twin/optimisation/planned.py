@@ -4,7 +4,6 @@ A run log counts lines by index from 0, or by N words (formats, section 3), and 
 cuts, there has to be a feed line of the program, and where it is at all, a line that does something.
 """
 
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -12,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import RunLogError
-from twin.gcode import Arc, Linear, Settings, interpret
-from twin.optimisation.words import source_lines
+from twin.programs import Arc, Linear, Settings
+from twin.programs.discovery import dialect_of
+from twin.programs.source import source_lines
 from twin.runlog import RunLog
 
-N_WORD = re.compile(r"^\s*/?\d?\s*N0*(\d+)", re.I)
 DIGITS = 6
 FITS = 0.98
 
@@ -54,10 +53,12 @@ def planned_cuts(run: RunLog, text: str, settings: Settings) -> dict[int, list[l
 def _reading(line: NDArray[np.int64], cuts: NDArray[np.bool_], text: str, settings: Settings, name: str) -> Reading:
     """The way that explains the run log."""
     source = source_lines(text)
-    moves = [move for move in interpret(text, settings) if move.program is None]
+    dialect = dialect_of(text, settings)
+    moves = [move for move in dialect.interpret(text, settings) if move.program is None]
     feeding = {move.line for move in moves if isinstance(move, Linear | Arc)}
     done = {move.line for move in moves}
-    by_word = {int(m[1]): k for k, one in enumerate(source) if (m := N_WORD.match(one))}
+    numbers = [dialect.words.block_number(one) for one in source]
+    by_word = {number: k for k, number in enumerate(numbers) if number is not None}
     readings = []
     for index in ({k: k for k in range(len(source))}, by_word):
         at = np.array([index.get(one, -1) for one in line.tolist()])

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from twin.engagement.along_path import PathRows, engaged_along
 from twin.engagement.tool_sections import collision_notes, tool_notes, tool_sections, tools_used, unknown_start
 from twin.errors import MachineError, OptimisationError
-from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import Kind, Path, path_from_moves
 from twin.optimisation.spring_passes import touching
-from twin.optimisation.words import branches, codes, figure_mm_min, find_word, inch_lines, source_lines
+from twin.programs import Arc, Linear
+from twin.programs.dialect import Dialect, SourceWords
+from twin.programs.discovery import dialect_of
+from twin.programs.source import source_lines
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,10 +36,6 @@ CLEARANCE_MM = 1.0
 SHALLOW = 0.02
 """Down to this slope, 1.1°, a ramp is taken for a level cut: its end face takes a fiftieth of the feed."""
 DIGITS, HEADING_STEPS = 6, 24
-NO_FEED = frozenset({0, 100, 280, 300, 520, 530, 650, 920, 921})
-"""Codes whose axis words are no feed, in tenths."""
-PROBING = frozenset({310, 311, 312, 313, 314, 370, 380, 382, 383, 384, 385})
-"""G31 and its kin, G37, G38.2 to G38.5, in tenths."""
 NEAR = "it feeds close to the work without cutting: an approach"
 SPRING = "it runs along the work and cuts nothing by its plan: a spring pass"
 
@@ -90,21 +88,31 @@ class Cuts:
         return len(self.line)
 
 
+NO_CUTS = Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Programmed:
     """A program on a machine. tools: those that it uses, with their numbers (0 = [tool])
 
+    dialect: its language
     notes: sentences on what the machine description does not say; collisions: lines (from 1) with a rapid into material
     """
 
     machine: MachineFile
     text: str
+    dialect: Dialect
     path: Path
     lines: tuple[FeedLine, ...]
     cuts: Cuts
     tools: tuple[tuple[int, Tool], ...]
     notes: tuple[str, ...]
     collisions: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> SourceWords:
+        """How its language writes feeds and speeds."""
+        return self.dialect.words
 
 
 def programmed(
@@ -121,7 +129,8 @@ def programmed(
 
     Raises PartProgramError where a control would refuse it, MachineError where nothing is known of what it cuts.
     """
-    moves = interpret(text, machine.settings)
+    dialect = dialect_of(text, machine.settings)
+    moves, words = dialect.interpret(text, machine.settings), dialect.words
     path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
@@ -137,8 +146,8 @@ def programmed(
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     source = source_lines(text)
-    _check_branches(source, {move.line for move in moves})
-    inch = inch_lines(source, machine.settings.inch)
+    _check_branches(source, words, {move.line for move in moves})
+    inch = words.inch_lines(source, machine.settings.inch)
     headed = any(tool.modes for _, tool in tools)
     lines: list[FeedLine] = []
     groups: list[Floats] = []
@@ -146,17 +155,16 @@ def programmed(
     for line, executions in _executions(path).items():
         segments = np.concatenate([np.arange(*span) for span in executions])
         segments = segments[path.kind[segments] != Kind.RAPID]
-        found = (
-            _cuts_of_segments(path, rows, segments, headed)
-            if rows is not None
-            else _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
-        )
+        if rows is not None:
+            found = _cuts_of_segments(path, rows, segments, headed)
+        else:
+            found = _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
         one = FeedLine(
             line, executions, int(numbers[segments[0]]), float(path.feed_mm_min[segments[0]]), float(speeds[segments[0]]),
             float(path.length_mm[segments].sum()), found.cut_mm, (0, 0),
         )  # fmt: skip
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
-        why = why or _no_plain_words(source[line]) or _still(source[line], speeds[segments], len(found.rows) > 0)
+        why = why or _by_its_words(source[line], words, speeds[segments], len(found.rows) > 0)
         if not len(found.rows) and not _is_clear(machine, path, segments, tools, int(numbers[segments[0]])):
             why = why or NEAR
             near[len(lines)] = segments
@@ -167,13 +175,15 @@ def programmed(
                 left_alone=why,
                 needs_speed=bool(why) and not in_air,
                 inch=inch[line],
-                plain_feed=_is_plain_feed(source[line], one.feed_mm_min, inch[line], line in tied),
+                plain_feed=_is_plain_feed(source[line], words, one.feed_mm_min, inch[line], line in tied),
             )
         )
         groups.append(found.rows)
     if rows is not None and machine.stock is not None:
         lines = _with_spring_passes(lines, near, touching(path, machine.stock, sections, list(near.values())))
-    return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes), collisions), groups)
+    return _numbered(
+        Programmed(machine, text, dialect, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
+    )
 
 
 def _with_spring_passes(lines: list[FeedLine], near: Mapping[int, Ints], touches: Sequence[bool]) -> list[FeedLine]:
@@ -269,32 +279,33 @@ def path_is_cycle(path: Path, executions: Sequence[tuple[int, int]]) -> bool:
     return any((path.kind[a:b] == Kind.RAPID).any() for a, b in executions)
 
 
-def _no_plain_words(text: str) -> str:
-    for letter, name in (("F", "feed"), ("S", "speed")):
-        place = find_word(text, letter)
+def _by_its_words(text: str, words: SourceWords, rpm: Floats, cuts: bool) -> str:
+    """Why a line is left alone for what it says: an expression, probing, or a feed that is no cut (a bar puller, a touch-off)."""
+    for place, name in ((words.feed_place(text), "feed"), (words.speed_place(text), "speed")):
         if place is not None and not place.plain:
             return f"its {name} is an expression"
-    return ""
+    if words.probes(text):
+        return "it is a probing move"
+    return "it feeds with the spindle at rest" if not cuts and (rpm == 0.0).any() else ""
 
 
-def _is_plain_feed(text: str, feed_mm_min: float, inch: bool, tied: bool) -> bool:
+def _is_plain_feed(text: str, words: SourceWords, feed_mm_min: float, inch: bool, tied: bool) -> bool:
     """Return True where the feed is what an F word says, in mm or inch a minute: not so in G93 and G95, nor by an expression."""
-    place = find_word(text, "F")
+    place = words.feed_place(text)
     if tied or (place is not None and not place.plain):
         return False
     if place is None:
         return True
-    said = figure_mm_min(text[place.begin + 1 : place.end].replace(" ", ""), inch)
+    said = words.figure_mm_min(text[place.figure : place.end].replace(" ", ""), inch)
     return abs(said - feed_mm_min) <= 1e-6 * feed_mm_min
 
 
-def _check_branches(source: list[str], run: set[int]) -> None:
+def _check_branches(source: list[str], words: SourceWords, run: set[int]) -> None:
     """Raises OptimisationError where a line that was not run would take the feed of a line that is to be changed."""
-    if not any(branches(source)):
+    if not any(words.branches(source)):
         return
     for number, line in enumerate(source):
-        moves = any(find_word(line, letter) is not None for letter in "XYZ") and not codes(line).g & NO_FEED
-        if number not in run and moves and find_word(line, "F") is None:
+        if number not in run and words.takes_feed(line) and words.feed_place(line) is None:
             why = "was not run (a branch, a block skip or a loop), and has no F of its own"
             raise OptimisationError(
                 f"line {number + 1} {why}: it would take a feed that is changed before it; write its F, and again"
@@ -319,17 +330,6 @@ def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[
         return True
     beside = [(low[:, k] - reach >= stock.max_mm[k]) | (high[:, k] + reach <= stock.min_mm[k]) for k in (0, 1)]
     return bool((beside[0] | beside[1]).all())
-
-
-def _still(text: str, rpm: Floats, cuts: bool) -> str:
-    """A feed that is no cut, and has a speed of its own for a reason: probing, a bar puller, a touch-off."""
-    if codes(text).g & PROBING:
-        return "it is a probing move"
-    return "it feeds with the spindle at rest" if not cuts and (rpm == 0.0).any() else ""
-
-
-def _no_cuts() -> Cuts:
-    return Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
 
 
 def _numbered(made: Programmed, groups: Sequence[Floats]) -> Programmed:

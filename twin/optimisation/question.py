@@ -133,7 +133,8 @@ def _made(text: str) -> tuple[Problem, tuple[Impossible, ...], str]:
     economy = Economy.of(machine.cost) if machine.cost is not None else None
     control = control_of(machine)
     left, impossible = allowed(read, CutForces.of(read), limits, control.feed_ratio)
-    left, groups, unshared = speed_groups(read, left, question.speed_changes)
+    changes = SpeedChanges.PER_TOOL if read.dialect.speed_per_tool else question.speed_changes
+    left, groups, unshared = speed_groups(read, left, changes)
     return Problem(read, left, groups, economy, control), impossible, unshared
 
 

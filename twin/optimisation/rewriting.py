@@ -13,30 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import PartProgramError
-from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.problem import Problem
 from twin.optimisation.speeds.stretches import changes_in_material
-from twin.optimisation.words import (
-    INCH_MM,
-    branches,
-    codes,
-    feed_figure,
-    figure_mm_min,
-    find_word,
-    joined,
-    source_lines,
-    with_word,
-)
+from twin.programs import interpret
+from twin.programs.source import joined, source_lines
 
 Floats = NDArray[np.float64]
 ROUNDS_MAX = 4
 SAME = 1e-9
-S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})
-STARTS = frozenset({3, 4})
-S_IS_NO_SPEED_M = frozenset({19, 29, 98, 198})
-"""Codes in whose block S is something else: an argument, a clamp, a surface speed, an angle, the speed of a tap."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +82,7 @@ def _changed_between(problem: Problem, path: Path) -> dict[int, str]:
 
 def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
     rows = {int(k): row for row, k in enumerate(problem.allowed.index)}
-    wanted = {}
+    wanted, words = {}, problem.program.words
     for k, line in enumerate(problem.program.lines):
         row = rows.get(k)
         if k in problem.groups.carriers:
@@ -106,9 +92,9 @@ def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
             speed = f"{abs(line.rpm):.9g}" if line.needs_speed and line.rpm else None
             wanted[line.line] = _Wanted(None, None, speed, None)
         else:
-            figure = feed_figure(float(feed[row]), line.inch)
+            figure = words.feed_figure(float(feed[row]), line.inch)
             speed = f"{rpm[row]:.9g}" if problem.allowed.cutting[row] else None
-            wanted[line.line] = _Wanted(figure, figure_mm_min(figure, line.inch), speed, float(rpm[row]))
+            wanted[line.line] = _Wanted(figure, words.figure_mm_min(figure, line.inch), speed, float(rpm[row]))
     return wanted
 
 
@@ -127,10 +113,10 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, sou
     feed: float | None = None
     for number in _order(problem):
         one = wanted[number]
-        if one.feed is not None and (one.feed_mm_min != feed or find_word(source[number], "F") is not None):
+        if one.feed is not None and (one.feed_mm_min != feed or problem.program.words.feed_place(source[number]) is not None):
             feeds.add(number)
         feed = one.feed_mm_min
-        if one.speed is not None and find_word(source[number], "S") is not None:
+        if one.speed is not None and problem.program.words.speed_place(source[number]) is not None:
             speeds.add(number)
     now = 0.0
     made = problem.speeds
@@ -145,7 +131,7 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, sou
 
 def _apart(problem: Problem, source: list[str]) -> set[int]:
     """Feed lines to which the control may come another way than from the feed line before them in the text."""
-    marks, found, last = branches(source), set(), -1
+    marks, found, last = problem.program.words.branches(source), set(), -1
     for number in sorted(line.line for line in problem.program.lines):
         if any(marks[max(last, 0) : number + 1]):
             found.add(number)
@@ -167,18 +153,17 @@ def _of_one_speed(problem: Problem) -> set[int]:
 def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, str]:
     """Lines whose S word sets the speed of a later line: line → figure. Of two starts by one S word the second gets its own."""
     found: dict[int, str] = {}
-    speeds = problem.speeds
+    speeds, words = problem.speeds, problem.program.words
     for e, event in enumerate(speeds.candidates.events):
         if event.kind != EventKind.SPINDLE or speeds.candidates.is_optional[e] or speeds.owner[e] < 0:
             continue
         for number in range(event.line, -1, -1):
-            place = find_word(source[number], "S")
+            place = words.speed_place(source[number])
             if place is not None:
-                of_block = codes(source[number])
-                if place.plain and not of_block.g & S_IS_NO_SPEED_G and not of_block.m & S_IS_NO_SPEED_M:
+                if place.plain and words.commands_speed(source[number]):
                     figure = f"{rpm[speeds.owner[e]]:.9g}"
                     is_taken = found.get(number, figure) != figure
-                    found[event.line if is_taken and STARTS & codes(source[event.line]).m else number] = figure
+                    found[event.line if is_taken and words.starts_spindle(source[event.line]) else number] = figure
                 break
     return found
 
@@ -188,26 +173,21 @@ def _changed(
     problem: Problem,
 ) -> dict[int, str]:  # fmt: skip
     changed: dict[int, str] = {}
+    words = problem.program.words
     for number, figure in speed_lines.items():
-        changed[number] = with_word(source[number], "S", figure)
+        changed[number] = words.with_speed(source[number], figure)
     programmed = {line.line: line for line in problem.program.lines}
     for number, one in wanted.items():
         text = changed.get(number, source[number])
         if number in feeds:
             # a line that is left alone gets the feed it was written for, which its modes would no longer give it
-            text = with_word(
-                text, "F", one.feed if one.feed is not None else _exact(programmed[number].feed_mm_min, programmed[number].inch)
-            )
+            line = programmed[number]
+            text = words.with_feed(text, one.feed or words.exact_feed_figure(line.feed_mm_min, line.inch))
         if number in speeds and one.speed is not None:
-            text = with_word(text, "S", one.speed)
+            text = words.with_speed(text, one.speed)
         if text != source[number]:
             changed[number] = text
     return changed
-
-
-def _exact(feed_mm_min: float, inch: bool) -> str:
-    text = f"{feed_mm_min / INCH_MM if inch else feed_mm_min:.6f}".rstrip("0")
-    return text if inch else text.rstrip(".")
 
 
 def _missed(problem: Problem, path: Path, wanted: dict[int, _Wanted]) -> dict[int, str]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from twin.optimisation.closed_form import Worth
 from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem
-from twin.optimisation.words import feed_figure, figure_mm_min
 
 Floats = NDArray[np.float64]
 SAME_RPM = 0.5
@@ -33,8 +32,10 @@ def rounded(problem: Problem, feed: Floats, rpm: Floats, worth: Worth) -> tuple[
         _round_speed(problem, same, speeds, worth)
     most = allowed.feed_max(speeds[None])[0]
     chosen = _within_power(problem, np.where(full, most, np.minimum(feed, most)), speeds)
-    inch = [problem.program.lines[int(k)].inch for k in allowed.index]
-    written = np.array([figure_mm_min(feed_figure(float(f), i), i) for f, i in zip(chosen, inch, strict=True)], dtype=np.float64)
+    inch, words = [problem.program.lines[int(k)].inch for k in allowed.index], problem.program.words
+    written = np.array(
+        [words.figure_mm_min(words.feed_figure(float(f), i), i) for f, i in zip(chosen, inch, strict=True)], dtype=np.float64
+    )
     return written.reshape(len(chosen)), speeds
 
 

@@ -20,7 +20,7 @@ Ints = NDArray[np.int64]
 def visits(path: Path) -> Ints:
     """Return the line of each visit (n,), in order.
 
-    >>> from twin.gcode import interpret
+    >>> from twin.programs import interpret
     >>> from twin.motion.path import path_from_moves
     >>> twice = "G1 F100 X1\\nM98 P7\\nX3\\nM98 P7\\nM30\\nO7\\nG91 X1\\nG90\\nM99\\n"
     >>> visits(path_from_moves(interpret(twice))).tolist()

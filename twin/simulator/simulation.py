@@ -1,6 +1,6 @@
 """The simulated machine: a part program in, what the machine would record out.
 
-program → canonical moves (twin.gcode) → path, look-ahead, reference (twin.motion) → engagement (twin.engagement) → response
+program → canonical moves (twin.programs) → path, look-ahead, reference (twin.motion) → engagement (twin.engagement) → response
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
-from twin.gcode import Settings, interpret
 from twin.learned.standing import seconds_of
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
@@ -20,6 +19,9 @@ from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
+from twin.programs import FeedForward, Settings, interpret
+from twin.programs.called import with_line_elsewhere
+from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond
 
@@ -70,6 +72,8 @@ def simulate(
 ) -> Simulation:
     """Runs a part program on a machine.
 
+    settings: None = those of the machine; else with the texts of the programs that this one calls, whose moves have a line beyond
+        the last one of this text
     seed: None = the machine's mean course, free of noise; a number = one course as its sensors would record it
     start_temperature_c: of the spindle; None = ambient
 
@@ -78,12 +82,15 @@ def simulate(
     """
     notes: list[str] = []
     settings = program_settings(machine) if settings is None else settings
-    path = path_from_moves(interpret(text, settings), settings.start_mm or None, settings.axes)
+    moves = with_line_elsewhere(interpret(text, settings), len(source_lines(text)))
+    path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
     if missing:
         follow = "follow their references" if len(missing) > 1 else "follows its reference"
         notes.append(f"no [axes.{missing[0]}]: {' and '.join(missing)} {follow} without error in this run")
+    if switched := next((move for move in moves if isinstance(move, FeedForward)), None):
+        notes.append(f"line {switched.line + 1}: the feed-forward that the program switches is not simulated; the machine's is")
     planned = program_plan(machine, path, notes)
     period_s = machine.machine.servo_period_s
     if planned.total_s / period_s > TICKS_MAX:

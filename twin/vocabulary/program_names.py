@@ -3,7 +3,8 @@
 import re
 from functools import lru_cache
 
-ENDINGS = (".nc", ".mpf", ".spf", ".h", ".eia", ".min", ".tap", ".txt")
+ENDINGS = (".nc", ".mpf", ".spf", ".h", ".eia", ".min", ".tap", ".ngc", ".cnc", ".gcode", ".txt")
+"""The endings of files with part programs, of all languages (`twin/programs`)."""
 _NUMBER = re.compile(r"[o:]?0*(\d+)")
 
 

@@ -12,7 +12,6 @@ from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On, Recorded, called
 from twin.errors import EffectError
 from twin.gap.labels import AXIS
-from twin.gcode import interpret
 from twin.heat.run import HEAT
 from twin.kernels.weave import quantities
 from twin.machine import Program
@@ -22,6 +21,7 @@ from twin.motion.path import path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
 from twin.process.kernel import CUT
+from twin.programs import interpret
 from twin.sensor.clock import looked_at, stamped
 from twin.sensor.sensing import SENSOR
 from twin.servo.kernel import AXES, axis_quantities

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from tests.depth import examples
 from twin.engagement.along_path import PathRows, Section, engaged_along
-from twin.gcode import Rapid, ToolLength, interpret
 from twin.machine import Stock
 from twin.motion.path import Path, path_from_moves
+from twin.programs import Rapid, ToolLength, interpret
 
 STOCK = Stock(min_mm=(0.0, 0.0, -10.0), max_mm=(60.0, 40.0, 0.0))
 SLOT = "G0 X-10. Y20.\nG1 Z-0.4 F500\nX70.\nG0 Z10.\n"

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from twin.errors import EffectError
-from twin.gcode import interpret
 from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.motion.control import LENGTH_OVER_FEED, Control, changed, control_of
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.sampling import sampled
+from twin.programs import interpret
 from twin.simulator.simulation import IDEAL_TIMES, simulate
 
 BARE = machine_from_toml("[machine]\nname = 'bare'\n")

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.gcode import canonical
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.programs import canonical
 
 COORDINATE = st.floats(-200.0, 200.0)
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from benchmarks.programs.columns import program_columns
 from twin.errors import MachineError, PartProgramError
-from twin.gcode import canonical
 from twin.machine import Program
 from twin.motion.candidates import Candidates
 from twin.motion.limits import Limits
@@ -17,6 +16,7 @@ from twin.motion.motion import ExecState
 from twin.motion.path import Path, path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
+from twin.programs import canonical
 
 LIMITS = Limits(rapid_mm_min=36000.0, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0)
 TRAPEZOID = LIMITS.with_(jerk_mm_s3=math.inf)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from twin.errors import RunLogError
-from twin.gcode import Settings
 from twin.optimisation.planned import planned_cuts
+from twin.programs import Settings
 from twin.runlog import RunLog, run_log
 
 DEPTHS = [0.2, 0.2, 2.0]

@@ -5,14 +5,15 @@ import pytest
 
 from tests.twin.optimisation.benchmark import machine_with, second, text
 from twin.errors import OptimisationError
-from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
 from twin.optimisation.answer import Objective
 from twin.optimisation.optimise import optimise
 from twin.optimisation.program import NEAR, SPRING
 from twin.optimisation.question import Question, problem
 from twin.optimisation.rewriting import rewritten
-from twin.optimisation.words import find_word, source_lines
+from twin.programs import Settings, interpret
+from twin.programs.fanuc.words import find_word
+from twin.programs.source import source_lines
 
 SHORT = {"evolutions": 5, "population": 8, "islands": 1}
 HEAD = "%\r\nO7 (SLOT F1 S1)\r\nG21 G90 G94\r\nS8000\r\nM3\r\nG0 Z10.\r\nX-10. Y0.\r\nZ-0.4\r\n"

@@ -1,10 +1,10 @@
 """Runs of programs of a shop, recorded as a machine with known limits would have recorded them."""
 
-from twin.gcode import Settings, interpret
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
+from twin.programs import Settings, interpret
 from twin.recording.observations import Observation, Observations
 from twin.recording.program_run import program_runs
 from twin.recording.recorded_program import NOMINAL, RecordedProgram, SetUp

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from twin.gcode import interpret
 from twin.motion.path import Path, path_from_moves
+from twin.programs import interpret
 from twin.recording.visits import by_visit, visits
 
 TWICE = "G21 G90 F1000\nG1 X10\nM98 P7\nG1 X20\nM98 P7\nM30\nO7\nG91 G1 Y5\nG1 Y-5\nG90\nM99\n"

@@ -18,13 +18,13 @@ from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
 from twin.gap.stages.free import effect_parameters
-from twin.gcode import Settings, interpret
 from twin.learned.standing import moved_by
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
 from twin.motion.plan import Plan, plan
 from twin.motion.sampling import sampled
+from twin.programs import Settings, interpret
 from twin.runlog import AXIS_COLUMN
 from twin.simulator.response import RunInput, respond
 from twin.simulator.simulation import IDEAL_TIMES
@@ -77,7 +77,7 @@ def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Tria
     """
     if unknown := [letter for letter in snippet.letters if letter not in machine.words]:
         raise MachineError(f"no program moves {', '.join(unknown)}; it has words for {', '.join(machine.words)}")
-    moves = interpret(snippet.program(), Settings(axes=machine.words))
+    moves = interpret(snippet.program(), Settings(dialect="fanuc", axes=machine.words))
     planned = plan(path_from_moves(moves, axes=machine.words), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
     motion = sampled(planned, HEAT_PERIOD_S if heat else machine.machine.servo_period_s)

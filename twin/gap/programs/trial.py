@@ -4,7 +4,6 @@ A run log knows no counter of its running time, so pauses are read off the run i
 (FEED_HOLD, STOPPED, …), and axes that stand for longer than a tool change, a spindle or a dwell of the program makes them.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,9 +12,11 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.errors import PartProgramError, TwinError
-from twin.gcode import Settings, interpret
 from twin.motion.limits import stops
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.programs import Settings, interpret
+from twin.programs.dialect import Dialect
+from twin.programs.discovery import dialect_of
 from twin.recording.program_run import OVERRIDES, Ending, Pause, ProgramRun
 from twin.recording.recorded_program import NOMINAL, RecordedProgram
 from twin.recording.visits import by_visit
@@ -37,7 +38,6 @@ LEVEL = 0.005
 """A straight block of at least this duration shows its feed, where two rows in it tell the same."""
 FEED_OFF = 0.1
 """Feeds of sections that are off by factors further apart than this belong to another program."""
-N_WORD = re.compile(r"^\s*/?\s*N0*(\d+)", re.I)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,8 @@ def _compared(name: str, log: RunLog, text: str, fitted: bool, settings: Setting
     if not np.all(path.feed_mm_min > 0.0):
         return Refused(name, f"its program has no feed at line {int(path.line[path.feed_mm_min <= 0.0][0]) + 1}")
     lines = tuple(text.splitlines())
-    path, line, source = by_visit(path, _line_indices(log["line"], text), len(lines))
+    indices = _line_indices(log["line"], text, dialect_of(text, settings), path)
+    path, line, source = by_visit(path, indices, len(lines))
     shown = _Shown(lines, source)
     run = _run(log, line, path)
     recorded = RecordedProgram(name, path, run)
@@ -174,13 +175,23 @@ def _run(log: RunLog, line: Ints, path: Path) -> ProgramRun:
     return replace(run, pauses=_pauses(columns, path))
 
 
-def _line_indices(recorded: Floats, text: str) -> Ints:
-    """Lines as indices of the text; N words where the figures go beyond its end and are N words."""
+def _line_indices(recorded: Floats, text: str, dialect: Dialect, path: Path) -> Ints:
+    """Lines as indices of the text; N words where the figures go beyond its end and are N words.
+
+    Where a control numbers every block, its numbers are taken if more rows are then in lines that do something.
+    """
     line = np.where(np.isfinite(recorded), recorded, -1.0).astype(np.int64)
     lines = text.splitlines()
-    words = {int(m[1]): index for index, text_line in enumerate(lines) if (m := N_WORD.match(text_line))}
+    words = {
+        number: index for index, text_line in enumerate(lines) if (number := dialect.words.block_number(text_line)) is not None
+    }
     if line.max() >= len(lines) and all(n in words for n in np.unique(line[line >= 0]).tolist()):
         return np.array([words.get(n, -1) for n in line.tolist()], dtype=np.int64)
+    if dialect.blocks_are_numbered:
+        doing = [*path.line.tolist(), *(event.line for event in path.events)]
+        by_number = np.array([words.get(n, -1) for n in line.tolist()], dtype=np.int64)
+        if np.isin(by_number, doing).mean() > np.isin(line, doing).mean():
+            return by_number
     return line
 
 

@@ -22,7 +22,7 @@ from twin.optimisation.allowed import Allowed, Span
 from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.program import Programmed
 from twin.optimisation.speeds.stretches import Stretch, stretches
-from twin.optimisation.words import find_word, source_lines
+from twin.programs.source import source_lines
 
 Ints = NDArray[np.int64]
 Spans = tuple[Span, ...]
@@ -128,7 +128,7 @@ def _carriers(program: Programmed, found: tuple[Stretch, ...], row_of: Mapping[i
     """
     first = {stretch.executions[0].line for stretch in found if any(one.line in row_of for one in stretch.executions)}
     source = source_lines(program.text)
-    plain = {k for k in first if (place := find_word(source[program.lines[k].line], "S")) is None or place.plain}
+    plain = {k for k in first if (place := program.words.speed_place(source[program.lines[k].line])) is None or place.plain}
     return frozenset(k for k in plain if k not in row_of and not program.lines[k].needs_speed)
 
 

@@ -32,6 +32,10 @@ def speed_notes(made: Problem, question: Question, path: Path, value: float) -> 
         )
         return (f"{changes}: {waits}; {_way_out(made, question, value)}",) if changed else ()
     notes = [_shared(made, path)]
+    if made.groups.changes is not question.speed_changes:
+        notes.append(
+            f"{made.program.dialect.title} has the speed in the block that calls the tool, so that no line has one of its own"
+        )
     if changed:
         line = made.program.lines[changed[0]].line + 1
         notes.append(f"{changes}, first before line {line}, by words of the program that are not to be changed")

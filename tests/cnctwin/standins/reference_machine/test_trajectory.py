@@ -5,7 +5,7 @@ import pytest
 
 from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
 from cnctwin.standins.reference_machine.trajectory import PER_MS, Circle, Dwell, Dynamics, Line, path_of
-from twin.gcode import Linear, interpret
+from twin.programs import Linear, interpret
 
 DYNAMICS = Dynamics(2400.0, 0.04)
 

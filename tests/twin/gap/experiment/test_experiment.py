@@ -12,11 +12,11 @@ from twin.gap.experiment.envelope import CutSeen, Envelope, envelope_of
 from twin.gap.experiment.menu import Snippet, axis_menu, machine_menu
 from twin.gap.experiment.remainder import remainder_experiment
 from twin.gap.experiment.run import with_constant
-from twin.gcode import interpret
 from twin.machine import AddedEffect, MachineFile, SpindleDrive, Thermal
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
+from twin.programs import interpret
 from twin.runlog import run_log
 from twin.simulator.simulation import IDEAL_TIMES
 

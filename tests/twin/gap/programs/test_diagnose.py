@@ -11,9 +11,9 @@ from twin.gap.diagnosis import Diagnosed, Verdict
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.programs.knobs import with_rapids_read
 from twin.gap.programs.trial import Trial, trial_of
-from twin.gcode import Settings, interpret
 from twin.motion.control import control_of
 from twin.motion.path import path_from_moves
+from twin.programs import Settings, interpret
 from twin.runlog import run_log
 from twin.simulator.simulation import IDEAL_TIMES
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tests.recordings import recording
 from tests.twin.gap.programs.written import PERIOD_S, case_of, made, plate_runs, shop_program, whole_program
 from twin.gap.programs.trial import Refused, Trial, section_feed_ratios, trial_of
-from twin.gcode import Settings
+from twin.programs import Settings
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import run_log
@@ -158,3 +158,37 @@ def test_a_line_beyond_a_subprogram_is_another_program(tmp_path: Path) -> None:
     line[-20:] = len(text.splitlines()) + 40
     refused = read(tmp_path, recorded | {"line": line}, text)
     assert isinstance(refused, Refused) and "another program" in refused.why
+
+
+KLARTEXT = """0 BEGIN PGM SHOP MM
+1 TOOL CALL 1 Z S3000
+2 CYCL DEF 200 DRILLING ~
+    Q200=+2 ~
+    Q201=-5 ~
+    Q206=+500 ~
+    Q202=+5 ~
+    Q210=+0 ~
+    Q203=+0 ~
+    Q204=+20 ~
+    Q211=+0
+3 L X+10 Y+10 R0 FMAX M3
+4 CYCL CALL
+5 L X+80 F1000
+6 L Y+60
+7 L X+10
+8 L Y+10
+9 M30
+10 END PGM SHOP MM
+"""
+
+
+@pytest.mark.parametrize(
+    "numbers", [None, {1: 1, 11: 3, 12: 4, 13: 5, 14: 6, 15: 7, 16: 8, 17: 9}], ids=["lines", "block numbers"]
+)
+def test_a_control_that_numbers_its_blocks_may_tell_these_numbers(tmp_path: Path, numbers: dict[int, int] | None) -> None:
+    recorded = made(KLARTEXT, {})
+    if numbers is not None:
+        recorded["line"] = np.array([numbers[int(line)] for line in np.asarray(recorded["line"])], dtype=np.float64)
+    trial = read(tmp_path, recorded, KLARTEXT)
+    assert isinstance(trial, Trial)
+    assert set(trial.recorded.run.columns["line"].tolist()) == set(made(KLARTEXT, {})["line"].tolist())

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from benchmarks.programs.columns import program_columns
 from tests.recordings import recording
 from twin.case import Case, read_case
-from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves
 from twin.motion.sampling import sampled
+from twin.programs import interpret
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import RunLog, run_log, write_run

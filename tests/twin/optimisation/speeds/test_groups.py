@@ -11,7 +11,6 @@ from tests.depth import examples
 from tests.twin.optimisation.benchmark import machine_with, paper, second, text
 from twin.engagement.tool_sections import tool_numbers
 from twin.errors import LimitsError
-from twin.gcode import interpret
 from twin.motion.path import Path, path_from_moves
 from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 from twin.optimisation.bound import bound_of
@@ -23,6 +22,7 @@ from twin.optimisation.question import Question, problem
 from twin.optimisation.seeds import closed_form, worth_of
 from twin.optimisation.speeds.groups import Kept, speed_groups
 from twin.optimisation.speeds.stretches import changes_in_material
+from twin.programs import interpret
 
 SHORT = {"evolutions": 5, "population": 8, "islands": 1}
 HEAD = "G21 G90\nS8000 M3\nG0 Z10.\nX-10. Y0.\nZ-0.4\n"

@@ -33,7 +33,7 @@ const choice = (name, options) =>
 /** Its fields in a dialog; `accepted(answer)` where the consumer has taken the job. */
 export function openNewJob(accepted) {
   const kind = choice("job", KINDS);
-  const program = fileOrName("program", ".nc,.txt,.tap,.mpf,.h,.eia,.min"),
+  const program = fileOrName("program", ".nc,.mpf,.spf,.h,.eia,.min,.tap,.ngc,.cnc,.gcode,.txt"),
     machine = fileOrName("machine", ".toml");
   const objective = choice("objective", OBJECTIVES);
   const changes = choice("speed_changes", SPEED_CHANGES);

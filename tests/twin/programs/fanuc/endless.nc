@@ -1,0 +1,6 @@
+%
+O1 (ENDLESS)
+N1 G91 G1 X1. F100.
+GOTO 1
+M30
+%

@@ -1,0 +1,53 @@
+"""Part programs in, canonical moves out: one folder for each language, found by discovery."""
+
+from twin.programs.canonical import (
+    Arc,
+    Coolant,
+    Dwell,
+    ExactStop,
+    FeedForward,
+    JerkLimit,
+    Linear,
+    LookAhead,
+    Move,
+    Position,
+    ProgramEnd,
+    ProgramStop,
+    Rapid,
+    Spindle,
+    SpindleOrient,
+    Tolerance,
+    ToolChange,
+    ToolLength,
+)
+from twin.programs.interpretation import interpret
+from twin.programs.settings import DwellUnit, IntegerWords, LeadIn, OffsetLookup, OutsideCorner, Settings, ToolOffset
+
+__all__ = [
+    "Arc",
+    "Coolant",
+    "Dwell",
+    "DwellUnit",
+    "ExactStop",
+    "FeedForward",
+    "IntegerWords",
+    "JerkLimit",
+    "LeadIn",
+    "Linear",
+    "LookAhead",
+    "Move",
+    "OffsetLookup",
+    "OutsideCorner",
+    "Position",
+    "ProgramEnd",
+    "ProgramStop",
+    "Rapid",
+    "Settings",
+    "Spindle",
+    "SpindleOrient",
+    "Tolerance",
+    "ToolChange",
+    "ToolLength",
+    "ToolOffset",
+    "interpret",
+]

@@ -1,0 +1,1 @@
+"""The mill dialect of FANUC-type controls."""

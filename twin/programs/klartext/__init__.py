@@ -1,0 +1,1 @@
+"""HEIDENHAIN Klartext: the language of TNC controls."""

@@ -1,0 +1,1 @@
+"""The machining cycles and those that change coordinates: a file a family."""

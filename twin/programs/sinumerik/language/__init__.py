@@ -1,0 +1,1 @@
+"""The text of a program, read: tokens, expressions, statements, blocks, and where they stand."""
