@@ -83,7 +83,7 @@ class Interpreter:
             and state.corner is None
             and state.pending_angle is None
             and state.rounding_mm == 0.0
-            and not state.length_is_due
+            and not (state.length_is_due or state.waits_for_tool)
             and len(state.axes) == 3
             and state.frames.program.matrix == IDENTITY
         )

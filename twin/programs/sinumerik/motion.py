@@ -64,6 +64,8 @@ def distance(start: Position, end: Position) -> float:
 def add(state: State, move: Motion) -> None:
     """Put out a motion, and take the position on."""
     state.checked(move.end_mm)
+    if state.waits_for_tool and not isinstance(move, Rapid):
+        raise RefusedError("", f"T{state.preselected} was chosen, and no tool is in the spindle yet; write M6")
     if state.corner is not None:
         move = corners.close(state, move)
     start = state.position

@@ -133,6 +133,11 @@ class State:
         """One unit of a programmed feed, mm: G70 leaves feeds in mm, G700 does not."""
         return MM_PER_INCH if self.modal["units"] == "G700" or (self.settings.inch and self.modal["units"] == "G70") else 1.0
 
+    @property
+    def waits_for_tool(self) -> bool:
+        """Return True where a tool with a length was chosen, and none is in the spindle yet: nothing can be cut so."""
+        return self.tool == 0 and bool(self.preselected) and bool(self.tool_offsets)
+
     def emit(self, move: Move) -> None:
         """Put out what is not a motion."""
         self.out.append(move)

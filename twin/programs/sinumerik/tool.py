@@ -77,6 +77,8 @@ def tool_radius(state: State, text: str) -> float:
     """The radius of the edge in force, with its wear; RefusedError where it is not known."""
     if not state.tool_offsets:
         raise RefusedError(text, "needs the radius of the tool; [control] tool_offsets gives it")
+    if state.tool == 0:
+        raise RefusedError(text, "needs the radius of the tool, and none is in the spindle; write T and M6")
     edge = offset(state, text)
     return edge.radius_mm + edge.radius_wear_mm
 

@@ -88,9 +88,9 @@ def test_the_feed_on_an_arc_is_that_of_the_contour(mode: str, inside: float, out
     ("text", "reason"),
     [
         ("T1 M6\nG41 G2 X10 CR=10 F100", "begins in a straight move"),
-        ("G41 G1 X10 F100\nTRANS X5", "cannot stand between"),
-        ("G41 G1 X10 F100\nG55 X5", "cannot stand between"),
-        ("G41 G1 X10 F100\nG450\nX20\nG451", "cannot stand between"),
+        ("T1 M6\nG41 G1 X10 F100\nTRANS X5", "cannot stand between"),
+        ("T1 M6\nG41 G1 X10 F100\nG55 X5", "cannot stand between"),
+        ("T1 M6\nG41 G1 X10 F100\nG450\nX20\nG451", "cannot stand between"),
         ("T1 M6\nG41 G1 X10 F100\nCYCLE81(10,0,1,-5)", "cannot stand between"),
         ("T1 M6\nG41 G1 X10 F100\nX20\nT2 M6", "cannot stand between"),
         ("T1 M6\nG41 G1 X10 F100\nX20\nY-16\nX10\nG40 X0", "gouge"),

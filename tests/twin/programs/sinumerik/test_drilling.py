@@ -95,7 +95,6 @@ def steps(moves: list[Move]) -> list[object]:
             "CYCLE840(10,0,2,-15,,1,0,3,0,,1.25)",
             [
                 *(("R", 2.0), ("L", -15.0), ("pause", 1.0), ("spindle", -500.0), ("L", 2.0), ("R", 10.0), ("spindle", 500.0)),
-                ("spindle", 500.0),
             ],
         ),
     ],

@@ -80,6 +80,8 @@ from twin.errors import PartProgramError
         ("T99 M6", "M6", "no tool 99"),
         ("T1 M6\nD2", "D2", "one edge a tool"),
         ("M6", "M6", "no tool was chosen"),
+        ("T1\nG1 X5 F100", "", "write M6"),
+        ("G41 G1 X5 F100", "G41", "write T and M6"),
         ("OVR=50", "OVR=50", "only 100 %"),
         ("G450 DISC=50", "DISC=50", "only DISC=0"),
         ("CYCLE81(10,0,2)", "CYCLE81 DP", "the depth"),

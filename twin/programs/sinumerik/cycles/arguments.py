@@ -17,6 +17,9 @@ class Arguments:
     __slots__ = ("cycle", "unit_mm", "values")
 
     def __init__(self, cycle: str, names: Sequence[str], given: Sequence[Value | None], unit_mm: float) -> None:
+        given = list(given)
+        while given and given[-1] is None:
+            given.pop()
         if len(given) > len(names):
             raise RefusedError(cycle, f"takes {len(names)} arguments, and the call has {len(given)}")
         self.cycle, self.unit_mm = cycle, unit_mm

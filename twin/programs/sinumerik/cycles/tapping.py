@@ -130,7 +130,7 @@ def with_chuck(state: State, given: Arguments) -> None:
     turn(state, DIRECTIONS[code] if code else -state.spindle_direction)
     tied(state, heights.start, per_rev)
     to(state, heights.back)
-    direction = -state.spindle_direction
     if code == 0:
-        turn(state, direction)
-    afterwards(state, given)
+        turn(state, -state.spindle_direction)
+    else:
+        afterwards(state, given)
