@@ -7,12 +7,12 @@ corners it goes on an arc (User's Manual TNC 640, "Tool radius compensation").
 from itertools import pairwise
 
 from twin.programs.arcs import Point
-from twin.programs.canonical import Linear, Motion, Move, Position, Rapid
+from twin.programs.canonical import Arc, Linear, Motion, Move, Position, Rapid
 from twin.programs.cutter_path import REACH_MM, CompensatedSection, Side, collect, join, put_out
 from twin.programs.klartext.approach import draw
-from twin.programs.klartext.state import State
+from twin.programs.klartext.state import EdgeFeed, State
 from twin.programs.pieces import in_plane, piece, placed
-from twin.programs.planar import extent, tangent
+from twin.programs.planar import Piece, extent, parallel, tangent
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import LeadIn, OutsideCorner
 
@@ -57,6 +57,26 @@ def begin(state: State, side: int, word: str) -> None:
     state.out = state.compensation.moves
 
 
+def at_the_edge(state: State, move: Motion) -> Motion:
+    """M109, M110: an arc with the feed at which its tool's edge runs along the contour at the programmed one.
+
+    The centre's feed is F (R - d) / R, with d the tool's radius, + towards the arc's centre.
+    """
+    if state.edge_feed is EdgeFeed.NONE or state.compensation is None or not isinstance(move, Arc):
+        return move
+    programmed = piece(state.position, move, state.plane)
+    shifted = parallel(programmed, state.left_mm)
+    if shifted is None or (state.edge_feed is EdgeFeed.INNER_ARCS and shifted.radius > programmed.radius):
+        return move
+    return move._replace(feed_mm_min=move.feed_mm_min * shifted.radius / programmed.radius)
+
+
+def leave_open(state: State) -> None:
+    """M98: at the inner corner behind this move the tool goes on to its very end, and from there to the start of the next."""
+    if state.compensation is not None and state.last is not None:
+        state.open_corners.append(state.last[1])
+
+
 def note(state: State, leaves: bool) -> None:
     """Remember how far to the left the motion that is put out next goes."""
     section = state.compensation
@@ -73,7 +93,11 @@ def finish(state: State) -> Point | None:
     before: list[Move] = []
     sides = collect(section, before)
     for first, second in pairwise(sides):
-        join(first, second, first is sides[0], LeadIn.NEXT, OutsideCorner.ARC)
+        if any(first.move is move for move in state.open_corners) and not second.leaves and first is not sides[0]:
+            first.bridges.append(Piece(first.end, second.begin))
+        else:
+            join(first, second, first is sides[0], LeadIn.NEXT, OutsideCorner.ARC)
+    state.open_corners = []
     if approach is not None and len(sides) < 2:
         place = (approach.first.line, approach.first.program)
         raise RefusedError("APPR", "needs a contour behind it, in the working plane", place)

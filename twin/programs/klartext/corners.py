@@ -56,7 +56,8 @@ def close(state: State, move: Motion) -> Motion:
     put = straight(kept, corner_end) if between.centre is None else rounded(kept, corner_start, between, plane)
     assert not isinstance(put, Rapid)
     put = put._replace(line=pending.line, feed_mm_min=pending.feed_mm_min or put.feed_mm_min)
-    insert(state, pending.at + 1, put)
+    state.position = corner_start
+    insert(state, pending.at + 1, compensation.at_the_edge(state, put))
     state.position = corner_end
     return rebuilt(move, corner_end, trimmed(second, start=between.end), plane)
 

@@ -9,20 +9,18 @@ from typing import Final
 from twin.programs.canonical import ProgramEnd, ProgramStop
 from twin.programs.klartext import compensation, spindle
 from twin.programs.klartext.block import MFunction
-from twin.programs.klartext.state import State
+from twin.programs.klartext.state import EdgeFeed, State
 from twin.programs.refusal import RefusedError
 
 STARTS: Final = {3: 1, 4: -1, 13: 1, 14: -1}
-HARMLESS: Final = frozenset({6, 90, 101, 102, 105, 106, 107, 108, 111, 113, 115, 117, 118, 120, 129, 134, 135, 138, 141, 143})
+EDGE_FEED: Final = {109: EdgeFeed.ALL_ARCS, 110: EdgeFeed.INNER_ARCS, 111: EdgeFeed.NONE}
+HARMLESS: Final = frozenset({6, 90, 101, 102, 105, 106, 107, 108, 113, 115, 117, 118, 120, 129, 134, 135, 138, 141, 143})
 HARMLESS_TOO: Final = frozenset({145, 148, 149})
 """They change no path: tool change by TOOL CALL, sister tools, handwheel, look-ahead of the compensation, and switches back."""
 REFUSED: Final[Mapping[int, str]] = {
     92: "its datum is the machine builder's; write M91, or coordinates of the workpiece",
     94: "takes whole turns from rotary axes, which the twin does not; leave it out",
     97: "leaves out what does not fit at small steps of a contour, in a way of its own; a smaller tool does without",
-    98: "lets the tool pass open corners; end the contour there with DEP",
-    109: "holds the feed at the cutting edge in arcs, which is not modelled; leave it out or write F on the arcs",
-    110: "holds the feed at the cutting edge in inner arcs, which is not modelled; leave it out or write F on the arcs",
     112: "puts curves between contour elements, which is not modelled; use cycle 32",
     114: "needs the kinematics of the rotary axes, which the twin does not have",
     116: "counts the feed of rotary axes in mm/min, which needs their radius",
@@ -33,7 +31,7 @@ REFUSED: Final[Mapping[int, str]] = {
     144: "needs the kinematics of the rotary axes, which the twin does not have",
 }
 CODES: Final = (
-    frozenset({0, 1, 2, 3, 4, 5, 8, 9, 13, 14, 19, 30, 89, 91, 99, 103, 126, 127, 136, 137, 140})
+    frozenset({0, 1, 2, 3, 4, 5, 8, 9, 13, 14, 19, 30, 89, 91, 98, 99, 103, 109, 110, 111, 126, 127, 136, 137, 140})
     | HARMLESS
     | HARMLESS_TOO
     | frozenset(REFUSED)
@@ -57,6 +55,8 @@ def before(state: State, functions: Sequence[MFunction]) -> None:
             spindle.coolant(state, True)
         if code == 103:
             limit_plunging(state, function)
+        elif code in (109, 110, 111):
+            state.edge_feed = EDGE_FEED[code]
         elif code in (126, 127):
             state.shortest_rotary = code == 126
         elif code in (136, 137):

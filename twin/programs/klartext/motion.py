@@ -157,6 +157,7 @@ def add(state: State, move: Motion, leaves: bool = False) -> None:
     elif state.corner is not None:
         raise RefusedError(state.corner.text, "the move behind a corner has to be in the working plane")
     if state.compensation is not None:
+        move = compensation.at_the_edge(state, move)
         compensation.note(state, leaves)
     state.emit(move)
     state.last = (state.position, move)

@@ -33,6 +33,8 @@ def compiled(source: Source, begin: int, head: str) -> Callable[[State], None]:
         rapid = motion.take_feed(state, block)
         before = state.position
         shape(state, block, rapid, leaves)
+        if has(block, 98):
+            compensation.leave_open(state)
         if leaves and state.compensation is not None:
             compensation.finish(state)
         retract(state, block)

@@ -5,6 +5,7 @@ It is the one thing that changes while a program runs; functions of the other fi
 
 import math
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Final
 
 from twin.programs.canonical import Motion, Move, Position, ToolLength
@@ -22,6 +23,14 @@ MM_PER_INCH: Final = 25.4
 INCH_FEED: Final = MM_PER_INCH / 10.0
 """In an inch program F counts tenths of an inch a minute (User's Manual iTNC 530, "Feed rate F")."""
 FEED_MAX: Final = 1e9
+
+
+class EdgeFeed(Enum):
+    """The arcs in which the feed is that of the cutting edge, not of the tool's centre: M111, M110, M109."""
+
+    NONE = "M111"
+    INNER_ARCS = "M110"
+    ALL_ARCS = "M109"
 
 
 @dataclass(slots=True)
@@ -84,6 +93,7 @@ class State:
         "coolant",
         "corner",
         "cycle",
+        "edge_feed",
         "feed_mm_min",
         "feed_per_rev_mm",
         "flow",
@@ -94,6 +104,7 @@ class State:
         "length_is_due",
         "line",
         "moves",
+        "open_corners",
         "out",
         "pattern",
         "per_revolution",
@@ -135,6 +146,8 @@ class State:
         self.per_revolution = False
         self.plunge_factor: float | None = None
         self.last_rapid = False
+        self.edge_feed = EdgeFeed.NONE
+        self.open_corners: list[Motion] = []
         self.rpm = 0.0
         self.spindle_direction = self.stopped_direction = 0
         self.coolant = False

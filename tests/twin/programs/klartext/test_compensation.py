@@ -101,6 +101,27 @@ CASES: dict[str, tuple[list[str], list[str]]] = {
             "line 60 30 0 F300",
         ],
     ),
+    "the feed of the cutting edge in arcs": (
+        [
+            "L X+0 Y+0 RL F100 M109",
+            "CR X+20 Y+20 R+20 DR+",
+            "CR X+30 Y+30 R+10 DR-",
+            "M110",
+            "CR X+40 Y+20 R+10 DR-",
+            "L Y-20 R0",
+        ],
+        [
+            "line 0 5 0 F100",
+            "arc 15 20 0 about 0 20 sweep 90 F75",
+            "arc 30 35 0 about 30 20 sweep -90 F150",
+            "arc 45 20 0 about 30 20 sweep -90 F100",
+            "line 40 -20 0 F100",
+        ],
+    ),
+    "an inner corner left open": (
+        ["L X+0 Y+0 RL F100", "L X+50 M98", "L Y+50", "L X+70 R0"],
+        ["line 0 5 0 F100", "line 50 5 0 F100", "line 45 0 0 F100", "line 45 50 0 F100", "line 70 50 0 F100"],
+    ),
     "down between APPR and its contour": (
         ["APPR LT X+0 Y+0 LEN10 RL F100", "L Z-3 M8", "L X+50", "DEP LT LEN8"],
         ["rapid -10 5 0", "line 0 5 0 F100", "coolant on", "line 0 5 -3 F100", "line 50 5 -3 F100", "line 58 5 -3 F100"],
