@@ -50,12 +50,11 @@ PASSED_OVER: Final = frozenset(
 )
 """Words with nothing to do here: displays, buffers, limits, dynamic data sets of the machine, switches that go to off."""
 PASSED_OVER_CALLS: Final = frozenset(
-    {"MSG", "FGROUP", "SETMS", "WORKPIECE", "STOPRE", "WRITE", "SPCON", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND", "F_HEAD"}
-    | {"CLEARM", "WAITM", "WAITMC", "SETM", "RELEASE", "GET", "INIT", "START", "GWPSON", "TRAFOOF", "FFWON_"}
+    {"MSG", "FGROUP", "SETMS", "WORKPIECE", "STOPRE", "WRITE", "SPCON", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND"}
+    | {"CLEARM", "WAITM", "WAITMC", "SETM", "RELEASE", "GET", "INIT", "START", "GWPSON", "TRAFOOF"}
 )
 """Calls with nothing to do here. WORKPIECE draws the blank, the groups fold the editor."""
 
 M_CODES: Final = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 17, 19, 30, 40, 41, 42, 43, 44, 45, 70})
-GEAR_STAGES: Final = frozenset({40, 41, 42, 43, 44, 45})
 CONTOUR_CODES: Final = frozenset({"G1", "G2", "G3", "CIP", "CT"})
 ARC_CODES: Final = frozenset({"G2", "G3", "CIP", "CT"})

@@ -56,17 +56,21 @@ class Interpreter:
         try:
             running = True
             while running:
-                level = self.flow.level
-                if self.flow.end_of_region():
-                    continue
-                if self.is_plain():
-                    self.plain_blocks()
-                running = self.block() if level.at < level.section.stop else self.returns()
+                running = self.step()
             self.finish()
         except RefusedError as refused:
             line, program = refused.place or (self.state.line, self.state.program)
             raise PartProgramError(line + 1, refused.word, refused.reason, program) from None
         return self.state.moves
+
+    def step(self) -> bool:
+        """Run plain blocks and one block behind them; False at the end of the program."""
+        level = self.flow.level
+        if self.flow.end_of_region():
+            return True
+        if self.is_plain():
+            self.plain_blocks()
+        return self.block() if level.at < level.section.stop else self.returns()
 
     def is_plain(self) -> bool:
         """Return True where the modes allow the short way."""
@@ -246,7 +250,12 @@ class Interpreter:
             arguments = modal.arguments if isinstance(modal, Invocation) else ()
             run_cycle(self.state, modal, [None if one is None else one(self.variables) for one in arguments], None)
             return
-        raise RefusedError(modal.text, "a subprogram at the positions of a pattern is not read; write the positions")
+        depth, line, program = len(self.flow.levels), self.state.line, self.state.program
+        self.call(modal, 1, is_modal=True)
+        while len(self.flow.levels) > depth:
+            if not self.step():
+                raise RefusedError(modal.text, "the subprogram at the positions of a pattern ends the program; write M17 there")
+        self.state.line, self.state.program = line, program
 
 
 def interpret(text: str, settings: Settings) -> list[Move]:

@@ -92,7 +92,6 @@ def set_modes(state: State, words: Words) -> None:
                 corners.abandoned(state)
                 state.tangent, state.pole.centre = None, (0.0, 0.0)
                 state.pole.radius_mm = state.pole.angle_deg = None
-                tool.set_length(state, words.written[group])
     if "motion" in codes:
         modal["motion"] = codes["motion"]
     if "feed" in codes and codes["feed"] != modal["feed"]:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from twin.programs.canonical import Motion, Move, Position, ToolLength
+from twin.programs.canonical import Move, Position, ToolLength
 from twin.programs.cutter_path import CompensatedSection
 from twin.programs.planes import PLANES
 from twin.programs.refusal import RefusedError
@@ -105,7 +105,6 @@ class State:
     distance_mm: dict[str, float] = field(default_factory=dict)
     tolerance_mm: float | None = None
     rotary_tolerance_deg: float | None = None
-    cycle_data: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.out = self.moves
@@ -173,11 +172,3 @@ class State:
         if not all(map(math.isfinite, position)) or any(abs(figure) > 1e12 for figure in position):
             raise RefusedError("", "the end of this move is beyond any machine")
         return position
-
-
-def last_motion(state: State) -> Motion | None:
-    """The motion put out last, if any is in the buffer."""
-    for move in reversed(state.out):
-        if hasattr(move, "end_mm"):
-            return move  # type: ignore[return-value]
-    return None

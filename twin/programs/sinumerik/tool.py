@@ -1,7 +1,7 @@
 """T, M6 and D: the tool in the spindle, its length and its radius.
 
 `Settings.tool_offsets` has one edge a tool, by the number of the tool: D1 is that edge, D0 is none. Without any table lengths
-are 0. The length acts along the normal of the plane, from the next move of that axis on.
+are 0. The length acts along z in every plane, as mills are set up ($SC_TOOL_LENGTH_CONST = 17), from the next move of z on.
 """
 
 from typing import Final
@@ -63,14 +63,12 @@ def offset(state: State, text: str) -> ToolOffset:
 
 
 def set_length(state: State, text: str) -> None:
-    """Let the length of the edge in force act along the normal of the plane."""
+    """Let the length of the edge in force act."""
     edge = offset(state, text) if state.tool_offsets else ToolOffset()
     length = edge.length_mm + edge.length_wear_mm
-    tool = [0.0] * len(state.axes)
-    tool[state.normal] = length
-    if tool != state.frames.tool:
-        state.length_is_due = state.length_is_due or tool[Z] != state.frames.tool[Z]
-        state.frames.tool = tool
+    if length != state.frames.tool[Z]:
+        state.frames.tool[Z] = length
+        state.length_is_due = True
 
 
 def tool_radius(state: State, text: str) -> float:

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.twin.programs.sinumerik.reading import ends, heights, run
-from twin.programs import Dwell, Linear, Move, ProgramStop, Rapid, Spindle, SpindleOrient
+from twin.programs import Dwell, Linear, Move, ProgramStop, Rapid, Settings, Spindle, SpindleOrient
 
 BEFORE = "G17 G90 S500 M3 F200\nG0 Z20\n"
 
@@ -197,3 +197,14 @@ def test_mcall_drills_at_every_place_until_it_is_off(pattern: str, before: str, 
 def test_a_pattern_turns_with_its_angle_and_with_the_frame() -> None:
     assert holes("CYCLE801(0,0,90,10,5,2,2)") == [(0.0, 0.0), (0.0, 10.0), (-5.0, 10.0), (-5.0, 0.0)]
     assert holes("ATRANS X100\nHOLES2(0,0,10,0,,2)") == [(110.0, 0.0), (90.0, 0.0)]
+
+
+def test_a_subprogram_is_called_at_the_places_of_a_pattern() -> None:
+    programs = Settings(programs={"dot": "G91 G1 Z-3 F100\nZ3\nG90\nM17"})
+    moves = run("G0 Z5\nMCALL DOT\nHOLES1(0,0,0,0,10,3)\nMCALL\nX99", programs)
+    assert [end[::2] for end in ends(moves)] == [
+        (0.0, 5.0),
+        *((x, z) for x in (0.0, 10.0, 20.0) for z in (5.0, 2.0, 5.0)),
+        (99.0, 5.0),
+    ]
+    assert {(move.line, move.program) for move in moves} == {(0, None), (2, None), (0, "DOT"), (1, "DOT"), (4, None)}

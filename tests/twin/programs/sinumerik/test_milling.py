@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.depth import examples
@@ -128,6 +128,7 @@ def test_the_way_in_may_go_to_and_fro() -> None:
     angle=st.floats(-180.0, 180.0),
     allowance=st.floats(0.0, 1.0),
 )
+@example(length=80.0, width=80.0, corner=5.0, step=9.5, angle=0.0, allowance=0.0)  # 8.75 apart they leave islands.
 def test_roughing_stays_inside_the_wall_and_leaves_nothing_standing(
     length: float, width: float, corner: float, step: float, angle: float, allowance: float
 ) -> None:
@@ -149,6 +150,10 @@ def test_roughing_stays_inside_the_wall_and_leaves_nothing_standing(
         for up in range(-4, 5):
             u, v = half_u * across / 4.5, half_v * up / 4.5
             assert min(off(way, (u, v)) for way in ways) <= radius + 1e-6
+    room = min(half_u, half_v)
+    for inset in (*(room * share / 20 for share in range(21)), min(radius + 0.1, room)):
+        # Along the diagonals, where the corners of the rings lie; just out of reach of the wall's ring they are furthest off.
+        assert min(off(way, (half_u - inset, half_v - inset)) for way in ways) <= radius + 1e-6
 
 
 def off(way: tuple[tuple[float, float], tuple[float, float]], point: tuple[float, float]) -> float:
@@ -220,6 +225,12 @@ def test_a_face_is_cut_in_equal_lines(way: int, expected: list[tuple[float, floa
     moves = of_cycle(f"CYCLE71(10,0,2,-4,0,0,40,30,0,4,16,0,0,500,{way},0)", 10.0)
     level = [place[:2] for letter, place in cuts(moves) if place[2] == -4.0]
     assert [place for place, before in zip(level, [None, *level], strict=False) if place != before] == expected
+
+
+def test_a_face_is_passed_along_by_fdp_and_across_by_fdp1() -> None:
+    moves = of_cycle("CYCLE71(10,0,2,-4,0,0,40,30,0,4,16,15,0,500,31,2)", 10.0)
+    level = [place[:2] for letter, place in cuts(moves) if place[2] == -4.0 and letter == "L"]
+    assert level == [(55.0, 6.0), (55.0, 22.0), (-15.0, 22.0)]  # The last middle is 30 + 2 - 10 across.
 
 
 def test_a_face_goes_down_in_equal_infeeds_to_its_allowance() -> None:

@@ -290,8 +290,9 @@ def test_a_tool_is_called_by_number_or_name_and_brings_its_length() -> None:
         ]
 
 
-def test_the_length_of_a_tool_acts_along_the_normal_of_the_plane() -> None:
-    assert ends(run("T2 M6\nG19 G0 X1\nG17 G0 Z1 X1", TOOLS)) == [(101.0, 0.0, 0.0), (1.0, 0.0, 101.0)]
+def test_the_length_of_a_tool_acts_along_z_in_every_plane() -> None:
+    text = "T2 M6\nG0 X0 Y0 Z5\nG19 G3 Y2 Z3 J2 K0 F100\nG17 G1 X1"
+    assert ends(run(text, TOOLS)) == [(0.0, 0.0, 105.0), (0.0, 2.0, 103.0), (1.0, 2.0, 103.0)]
 
 
 def test_a_plain_block_and_the_same_one_the_long_way_make_the_same_move() -> None:

@@ -2,7 +2,8 @@
 
 Roughing goes down in equal infeeds of at most _MID to the allowance _FALD, finishing once to the depth. The tens of _VARI are the
 way: 1 along the first axis of the plane in one direction, 2 along the second, 3 and 4 to and fro. The cuts are of equal width, at
-most _MIDA; the tool begins and ends beside the face, by _FDP1 or its radius and the safety clearance.
+most _MIDA; the tool begins and ends beside the face, by _FDP or its radius and the safety clearance, and the last cut goes over
+the edge by _FDP1.
 """
 
 import math
@@ -24,7 +25,7 @@ def face(state: State, given: Arguments) -> None:
     heights = levels(state, given)
     size = (given.length("_LENG"), given.length("_WID"))
     shape = Shape(state, (given.length("_PA"), given.length("_PO")), math.radians(given.number("_STA")))
-    over = given.size("_FDP1")
+    over = given.size("_FDP")
     cut(state, given, heights, shape, (size[0], size[1], given.size("_MIDA"), over))
 
 
@@ -44,6 +45,7 @@ def cut(state: State, given: Arguments, heights: Levels, shape: Shape, how: tupl
             f"{given.cycle} _MIDA", f"is wider than the tool, {2.0 * radius:g} mm: it would leave material (61105)"
         )
     along, across = (leng, wid) if way in (1, 3) else (wid, leng)
+    across += math.copysign(given.size("_FDP1"), across)
     count = max(math.ceil(abs(across) / most - SMALL_MM), 1)
     if count > CUTS_MAX:
         raise RefusedError(f"{given.cycle} _MIDA", f"makes more than {CUTS_MAX} cuts; a larger one")

@@ -20,6 +20,8 @@ from twin.programs.sinumerik.state import State
 SMALL_MM: Final = 1e-9
 WIDTH_SHARE: Final = 0.8
 """Of the tool's diameter: the width of a cut where _MIDA is 0."""
+CORNER_SHARE: Final = 1.7
+"""Of the tool's radius, just under 1 + 1/√2: the widest step between rings with corners that leaves no island there."""
 
 
 class Segment(NamedTuple):
@@ -114,10 +116,13 @@ def turns_left(state: State, given: Arguments, name: str = "_CDIR") -> bool:
     return (code == 0) == (state.spindle_direction >= 0)
 
 
-def width(state: State, given: Arguments, radius: float, room: float) -> int:
-    """How many rings: steps of equal width of at most _MIDA, or 80 % of the diameter, fill the room."""
+def rings(state: State, given: Arguments, radius: float, room: float, has_corners: bool) -> int:
+    """Return how many rings fill the room, in steps of equal width of at most _MIDA, or 80 % of the diameter.
+
+    has_corners: at a corner the inner ring is √2 times as far from what the outer one just misses, so steps are narrower
+    """
     most = given.size("_MIDA") or WIDTH_SHARE * 2.0 * radius
-    most = min(most, 2.0 * radius)
+    most = min(most, CORNER_SHARE * radius if has_corners else 2.0 * radius)
     many = max(math.ceil(room / most - SMALL_MM), 1) if room > SMALL_MM else 0
     if many > state.settings.pecks_max:
         raise RefusedError(f"{given.cycle} _MIDA", f"makes more than {state.settings.pecks_max} rings; a larger one")

@@ -19,10 +19,10 @@ from twin.programs.sinumerik.cycles.milling import (
     Segment,
     Shape,
     circle_ring,
+    rings,
     rounded_ring,
     steps,
     turns_left,
-    width,
 )
 from twin.programs.sinumerik.state import State
 from twin.programs.sinumerik.tool import cutter_radius
@@ -187,7 +187,7 @@ def outwards(state: State, given: Arguments, shape: Shape, pocket: Pocket, how: 
     """From the middle: along the line that is left when rings fill the rest, then ring after ring, the last by the allowance."""
     radius, side, feed = how
     room = pocket.room - side
-    count = width(state, given, radius, room)
+    count = rings(state, given, radius, room, pocket.corner < pocket.room - SMALL_MM)
     long_u, long_v = pocket.half_u - pocket.room, pocket.half_v - pocket.room
     if long_u > SMALL_MM:
         shape.along([Segment((long_u, 0.0)), Segment((-long_u, 0.0)), Segment((long_u, 0.0))], feed)

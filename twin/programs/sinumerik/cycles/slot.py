@@ -109,7 +109,7 @@ def slots(state: State, given: Arguments, way: Way, half: float) -> None:
         )
     side = given.size("FAL")
     room = half - tool
-    if room < side - SMALL_MM or 2.0 * tool < half - SMALL_MM:
+    if room < side - SMALL_MM or 3.0 * tool < half - SMALL_MM:
         reason = f"the tool, {tool:g} mm in radius, is too large for the slot, or leaves its middle standing (61105, 61106)"
         raise RefusedError(f"{given.cycle} WID", reason)
     for shape in shapes(state, given):

@@ -1,6 +1,6 @@
 """What a block can be, once read: a list of parts that work together, or one statement that leads the program."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from twin.programs.sinumerik.language.expressions import Expression, Variable
@@ -198,4 +198,3 @@ class Block:
     skip: int | None = None
     number: int | None = None
     label: str = ""
-    names: frozenset[str] = field(default_factory=frozenset)
