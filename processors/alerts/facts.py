@@ -22,7 +22,7 @@ INPUTS = frozenset(
     {
         *(PROGRAM, TOOL, CONTROL_ALARM, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_GROWING_SIGNAL),
         *(twin_signals.TOOL_WEAR_PCT, twin_signals.TOOL_PARTS_LEFT, twin_signals.TOOL_PARTS_LEFT_LOW),
-        *(twin_signals.TOOL_PARTS_LEFT_HIGH, twin_signals.MACHINE_DRIFT_BASIS),
+        *(twin_signals.TOOL_PARTS_LEFT_HIGH, twin_signals.MACHINE_DRIFT_BASIS, twin_signals.CONTROL_ALARM_TEXT),
     }
 )
 TEXT_MAX = 300
@@ -53,10 +53,14 @@ def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
     elif signal == twin_signals.TOOL_WEARS_FAST:
         numbers = {name: _number(_value(row, metric)) for name, metric in _WEAR.items()}
         facts |= {name: number for name, number in numbers.items() if number is not None}
+    elif signal == twin_signals.CONTROL_ALARM:
+        facts["control_alarm"] = _text(row, twin_signals.CONTROL_ALARM_TEXT)
     elif signal in _SENTENCES:
         name, metric = _SENTENCES[signal]
         facts[name] = _text(row, metric)
     facts |= {"program": _text(row, PROGRAM), "tool": _text(row, TOOL), "control": _text(row, CONTROL_ALARM)}
+    if signal == twin_signals.CONTROL_ALARM:
+        del facts["control"]  # its own sentence says it
     return {name: fact for name, fact in facts.items() if fact != ""}
 
 

@@ -104,6 +104,10 @@ RULE_FINDINGS = f"{RULE_PREFIX}findings"
 """JSON text: by the name of each rule that alarms value, limit, unit and since when (ms), as of the moment it was raised."""
 SEVERITY = f"{TWIN_PREFIX}severity"
 
+# control_alarms
+CONTROL_ALARM = f"{TWIN_PREFIX}control_alarm"
+CONTROL_ALARM_TEXT = f"{TWIN_PREFIX}control_alarm_text"
+
 # events
 STOP_REASON = f"{TWIN_PREFIX}stop_reason"
 PART_RECORD = f"{TWIN_PREFIX}part_record"
