@@ -13,7 +13,7 @@ from sparkplug.quality import Quality
 
 def told(alarms: Any, config: Config | None = None, quality: Quality = Quality.GOOD) -> dict[str, Any]:
     text = alarms if isinstance(alarms, str) or alarms is None else json.dumps(alarms)
-    reading = Reading(ALARMS, text, 1000, quality, "the edge is gone" if quality is not Quality.GOOD else None, None, False)
+    reading = Reading(ALARMS, text, 1000, quality, None, "the edge is gone" if quality is not Quality.GOOD else None, False)
     _, outputs = step(config or Config(), State(), Sample("vmc", SampleKind.DATA, 1.0, {ALARMS: reading}, (ALARMS,)))
     return {one.name: one.value if one.reason is None else one.reason for one in outputs}
 
