@@ -180,7 +180,8 @@ export function open(app, { machine: asked }) {
 
   async function load() {
     const mine = ++turn,
-      to = Math.round(serverNow()),
+      newest = Math.max(serverNow(), ...[...app.plant.machines.values()].map((one) => one.lastT)), // a time lapse runs ahead
+      to = Math.round(newest),
       base = { machine: chosen.machine || null, from: to - chosen.stretch, to };
     csv.setAttribute("href", query("figures", { ...base, by: chosen.by, format: "csv" }));
     partsCsv.setAttribute("href", query("figures", { ...base, by: "part", format: "csv" }));

@@ -1,25 +1,11 @@
 // A tile: what is measured, large; its twin and what is between the two below; where each comes from, and how old it is.
 
-import { tileOf, valueAt, SCORES } from "../charted.js";
+import { tileOf, SCORES } from "../charted.js";
 import { el, setClass, setData, setHidden, setText, setTitle } from "../dom.js";
 import { age, fixed, moment, number, rounded, signed } from "../text.js";
 import { COMMON_MODE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 const OLD_MS = 10000;
-const BEHIND_MS = 2000; // by so much the twin may be behind before that is worth a word
-
-/**
- * The moment that a tile shows: the last one that the twin has spoken of, so that what is measured, the twin and what is between
- * them belong together. NaN where nothing is compared. The twin tells a residual with each of its figures; without one it is as new
- * as what is measured, unless that has just changed.
- */
-function momentOf(machine, shown, held) {
-  const twin = shown.twin && shown.twinIs === "twin" ? machine.value(shown.twin) : null;
-  if (!twin || !held) return NaN;
-  const residual = shown.residual ? machine.value(shown.residual) : null,
-    told = Math.max(twin.t, residual?.t ?? -Infinity);
-  return residual || held.t - told < BEHIND_MS ? told : NaN;
-}
 
 /** The age of a figure, where that is worth a word: a value that does not change is not sent again, so age alone is no fault. */
 function agedText(machine, held) {
@@ -112,11 +98,8 @@ export class Tile {
     setHidden(this.element, !shown);
     if (!shown) return;
     const held = machine.value(shown.own);
-    const number_ = held && typeof held.value === "number",
-      told = momentOf(machine, shown, held),
-      behind = number_ && held.t - told > BEHIND_MS,
-      then = held && held.t > told ? (valueAt(machine, shown.own, told) ?? held.value) : held?.value;
-    setText(this.figure, number_ ? number(behind ? held.value : then, held.unit) : "–");
+    const number_ = held && typeof held.value === "number";
+    setText(this.figure, number_ ? number(held.value, held.unit) : "–");
     setText(this.unit, held?.unit ?? "");
     setTitle(this.figure, held?.meaning ?? "");
     this.from.write(held?.provenance ?? null);
@@ -140,13 +123,14 @@ export class Tile {
     else setHidden(this.twin.element, true);
     if (shown.learned) this.learned.write(machine, shown.learned, number, { unit: held?.unit });
     else setHidden(this.learned.element, true);
-    this.#rest(shown, held, then, behind ? told : NaN);
+    this.#rest(shown, held);
   }
 
-  /** What is between the two, as of the moment that is shown; `behind`: that moment, where the twin is behind. */
-  #rest(shown, held, then, behind) {
+  /** What is between the two figures that are shown. The twin's own residual is of the moment at which it last changed by enough
+   * to be told, and stands here only where one of the two is not known. */
+  #rest(shown, held) {
     const twin = shown.twin && shown.twinIs === "twin" ? this.machine.value(shown.twin) : null;
-    const both = typeof twin?.value === "number" && typeof then === "number";
+    const both = typeof twin?.value === "number" && typeof held?.value === "number";
     if (shown.residual && !both) {
       this.rest.write(this.machine, shown.residual, signed);
       return;
@@ -154,8 +138,8 @@ export class Tile {
     setHidden(this.rest.element, !both);
     if (!both) return;
     const unit = held.unit === "°C" ? "K" : (held.unit ?? "");
-    setText(this.rest.figure, `${signed(rounded(then, held.unit) - rounded(twin.value, held.unit), held.unit)} ${unit}`);
-    setText(this.rest.more, Number.isFinite(behind) ? `(at ${moment(behind)}: the twin is behind)` : "");
+    setText(this.rest.figure, `${signed(rounded(held.value, held.unit) - rounded(twin.value, held.unit), held.unit)} ${unit}`);
+    setText(this.rest.more, "");
     setData(this.rest.word, "from", "inferred");
     setClass(this.rest.figure, "old", twin.quality !== "good" || held.quality !== "good");
   }
