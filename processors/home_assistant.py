@@ -16,7 +16,7 @@ from processors.outputs import declared_outputs, kind_of_signal
 from processors.plain_topic import topic_level, topic_path
 from sparkplug.metric import Reading
 from twin.vocabulary import topics, twin_signals
-from twin.vocabulary.signals import Kind, canonical
+from twin.vocabulary.signals import PLC_PREFIX, VARIABLE_PREFIX, Kind, canonical
 
 PREFIX = topics.HOME_ASSISTANT
 SENSOR, BINARY_SENSOR = "sensor", "binary_sensor"
@@ -43,6 +43,12 @@ DOCUMENTS = frozenset(
         twin_signals.ANOMALY_VERDICTS,
         twin_signals.ANOMALY_WHY,
         twin_signals.CUT_RECORD,
+        twin_signals.PRODUCTION,
+        twin_signals.PRODUCTION_NOW,
+        twin_signals.RULE_FINDINGS,
+        twin_signals.STOPS,
+        "alarms",
+        "alarm_history",
         twin_signals.PART_RECORD,
         twin_signals.TOOL_LIVES,
     }
@@ -148,6 +154,7 @@ def identifier(name: str) -> str:
 
 def _entities(row: Mapping[str, Reading]) -> Iterator[Entity]:
     for name, reading in row.items():
-        kind = kind_of_signal(name) or _OF_TYPE.get(type(reading.value))
+        is_chosen = name.startswith((PLC_PREFIX, VARIABLE_PREFIX))  # by configuration, which may make a flag of it
+        kind = (None if is_chosen else kind_of_signal(name)) or _OF_TYPE.get(type(reading.value))
         if kind is not None and name not in DOCUMENTS and twin_signals.live_name(name) is None:
             yield Entity(name, kind, reading.unit)

@@ -65,10 +65,12 @@ def optimise(
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
         from cnctwin.batch.optimisation import Files, left_alone
+        from cnctwin.files.called_programs import speaking
         from twin.machine import read_machine
         from twin.machine_toml import machine_to_toml
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
     text, encoding = read_encoded(program)
+    described = speaking(described, program, text)
     question = asked.Question(
         program_text=text,
         machine_toml=machine_to_toml(described),

@@ -4,11 +4,15 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cnctwin.files.program_text import read_text
-from twin.programs.discovery import dialect_of
+from twin.programs.discovery import dialect_of, told_by_ending
 from twin.programs.settings import Settings
 from twin.vocabulary.program_names import ENDINGS
+
+if TYPE_CHECKING:
+    from twin.machine import MachineFile
 
 
 class CalledPrograms(Mapping[str, str]):
@@ -37,5 +41,12 @@ class CalledPrograms(Mapping[str, str]):
 
 
 def with_called_programs(settings: Settings, program: Path, text: str) -> Settings:
-    """Return the settings with the programs of the same language beside a program. Raises PartProgramError where it has none."""
+    """Return the settings with the language of a program and those of the same language beside it. Raises PartProgramError."""
+    settings = replace(settings, dialect=told_by_ending(text, program.suffix, settings.dialect))
     return replace(settings, programs=CalledPrograms(program, dialect_of(text, settings).suffixes))
+
+
+def speaking(machine: "MachineFile", program: Path, text: str) -> "MachineFile":
+    """Return the machine with the language of a program, where its [control] names none and the program's ending does."""
+    dialect = told_by_ending(text, program.suffix, machine.control.dialect)
+    return machine.model_copy(update={"control": machine.control.model_copy(update={"dialect": dialect})})

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeVar
 
 from cnctwin.batch.optimisation import Files, answer_to, left_alone, write_answer
 from cnctwin.errors import UsageError
+from cnctwin.files.called_programs import speaking
 from cnctwin.interface.errors import one_tree
 from cnctwin.interface.machine import machine_of
 from cnctwin.interface.part_program import part_program
@@ -110,6 +111,8 @@ def optimise(
     Raises LimitsError where no feed and speed keep the limits, ProgramError, MachineError, UsageError.
     """
     described, read = machine_of(machine), part_program(program)
+    if isinstance(program, Path):
+        described = speaking(described, program, read.text)
     wanted = _word(Objective, "objective", objective)
     changes = _word(SpeedChanges, "speed_changes", speed_changes)
     with one_tree(str(program) if isinstance(program, Path) else read.name):

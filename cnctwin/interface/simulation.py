@@ -5,6 +5,7 @@ from pathlib import Path
 
 import twin.simulator.simulation
 from cnctwin.batch.simulation import Summary, summary_of
+from cnctwin.files.called_programs import with_called_programs
 from cnctwin.interface.errors import one_tree
 from cnctwin.interface.machine import machine_of
 from cnctwin.interface.part_program import part_program
@@ -58,9 +59,13 @@ def simulate(
     """
     described, read = machine_of(machine), part_program(program)
     with one_tree(str(program) if isinstance(program, Path) else read.name):
+        settings = twin.simulator.simulation.program_settings(described)
+        if isinstance(program, Path):
+            settings = with_called_programs(settings, program, read.text)
         done = twin.simulator.simulation.simulate(
             described,
             read.text,
+            settings=settings,
             seed=seed,
             start_temperature_c=start_temperature_c,
             ambient_temp_c=ambient_temp_c,

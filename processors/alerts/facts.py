@@ -1,6 +1,7 @@
 """The facts of an alert: what the machine's row says of it when it begins, as plain values that a text can be filled with.
 
-    value, limit, unit      of a rule, as of the moment it was raised; lasted_s: how long that had lasted by then; line: of the NC
+    value, limit, unit      of a rule, as of the moment it was raised; signal: the one to look at; lasted_s: how long that had
+                            lasted by then; line: of the NC
     signal, away, …         of a score: how far which signal is from what, in which lines, like what, and how many peers show it
     what_grows, …           a sentence that the processor publishes itself
     program, tool           what the machine was doing; control: the alarm that the control itself shows then
@@ -72,7 +73,7 @@ def _of_rule(rule: str, row: Row, at_ms: int) -> Facts:
     for name in ("value", "limit", "line"):
         if (number := _number(found.get(name))) is not None:
             facts[name] = number
-    facts["unit"] = _clean(found.get("unit"))
+    facts |= {"unit": _clean(found.get("unit")), "signal": _clean(found.get("signal"))}
     since_ms = _number(found.get("since"))
     if since_ms is not None and since_ms <= at_ms:
         facts["lasted_s"] = (at_ms - since_ms) / 1000.0

@@ -93,8 +93,8 @@ def advanced(alert: Alert, rule: Rule, condition: Condition, beat: Beat, config:
         return replace(alert, clear_s=None, rises_s=rises_s)
     clear_s = 0.0 if alert.clear_s is None else alert.clear_s + beat.seen_s
     if clear_s >= keep_firing_for_s(alert, rule, beat.clock_s, config):
-        return _ended(alert, beat, condition.at_ms)
-    return replace(alert, clear_s=clear_s)
+        return _ended(alert, beat, condition.at_ms if alert.clear_s is None else alert.clear_ms)
+    return replace(alert, clear_s=clear_s, clear_ms=condition.at_ms if alert.clear_s is None else alert.clear_ms)
 
 
 def raised(alert: Alert, severity: Severity, beat: Beat) -> Alert:

@@ -50,6 +50,7 @@ class Alert:
 
     episode: its start in event time, ms since 1970: what tells one firing from the next, also after a crash
     held_s, clear_s: how long the alarm was seen while pending; how long it is gone while firing (None: it stands)
+    clear_ms: when it went, in event time
     unknown: why the alarm cannot be read now; the phase is kept meanwhile
     earlier: start and end (ms) of the last episode that fired, while another pends
     fired_s: when this episode fired, by clock_s
@@ -68,6 +69,7 @@ class Alert:
     since_wall_s: float = 0.0
     held_s: float = 0.0
     clear_s: float | None = None
+    clear_ms: int = 0
     unknown: str = ""
     unknown_s: float = 0.0
     ended_ms: int = 0

@@ -88,6 +88,7 @@ class Given(NamedTuple):
 class Rule:
     """One rule: it is published as `twin/rule_<name>`.
 
+    shows: the signal that a person should look at
     is_of_programs: it needs an expectation of the NC program; `twin/rule_detail` does not name it where there is none
     """
 
@@ -96,6 +97,7 @@ class Rule:
     reads: frozenset[str]
     timing: Callable[[Config], Timing]
     judge: Callable[[Given], Judgement]
+    shows: str
     is_of_programs: bool = False
 
     @property
@@ -111,6 +113,7 @@ RULES = (
         frozenset({LOAD, SPEED}),
         lambda config: Timing(config.load_dwell_s, config.load_clear_s),
         lambda given: load_over_limit(given.config, given.moves, given.load),
+        LOAD,
     ),
     Rule(
         "thermal_runaway",
@@ -118,6 +121,7 @@ RULES = (
         frozenset({TEMPERATURE}),
         lambda config: Timing(config.runaway_dwell_s, config.runaway_clear_s),
         lambda given: thermal_runaway(given.config, given.trend, given.temperature),
+        TEMPERATURE,
     ),
     Rule(
         "load_without_feed",
@@ -125,6 +129,7 @@ RULES = (
         frozenset({LOAD, SPEED, FEED, EXECUTION}),
         lambda config: Timing(config.no_feed_dwell_s, config.no_feed_clear_s),
         lambda given: load_without_feed(given.config, given.moves, given.load, given.sample),
+        LOAD,
     ),
     Rule(
         "vibration",
@@ -132,6 +137,7 @@ RULES = (
         frozenset({SPEED, *SOURCES}),
         lambda config: Timing(config.vibration_dwell_s, config.vibration_clear_s),
         lambda given: vibration(given.config, given.moves, given.zone, given.velocity),
+        SOURCES[0],
     ),
     Rule(
         "tool_broken",
@@ -139,6 +145,7 @@ RULES = (
         frozenset({CUT, LEAST, MOST, RATIO, SPEED, FEED}),
         lambda config: Timing(0.0, config.tool_broken_clear_s),
         lambda given: tool_broken(given.config, given.moves, given.sample, given.cut),
+        LOAD,
         is_of_programs=True,
     ),
     Rule(
@@ -147,6 +154,7 @@ RULES = (
         frozenset({CUT, MOST, RATIO, SPEED}),
         lambda config: Timing(config.over_expected_s, config.over_expected_clear_s),
         lambda given: load_over_expected(given.config, given.moves, given.sample),
+        LOAD,
         is_of_programs=True,
     ),
 )
@@ -225,6 +233,7 @@ def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool
             alarms.append(f"{rule.name}: {text}, since {_utc(stand.alarm_s)}")
             at_ms = round(stand.alarm_s * 1000)
             found = findings[rule.name] = {"value": round(value, 3), "limit": round(limit, 3), "unit": unit, "since": at_ms}
+            found["signal"] = rule.shows
             if stand.line is not None:
                 found["line"] = stand.line
     outputs.append(Output(ZONE, zone) if has_zone else Output.null(ZONE, zone))

@@ -69,6 +69,13 @@ def test_a_birth_announces_the_machine_with_what_is_known_of_it() -> None:
     assert OKUMA not in plain(fed(engine, data(2.0, spindle_rpm=3.0), death(3.0)))
 
 
+def test_a_plc_address_that_is_a_flag_is_one_here_too_and_lists_of_alarms_are_no_entities() -> None:
+    found = shown(fed(asked(), birth(0.0, plc_door_open=False, plc_pressure=3.5, alarms="[]", spindle_rpm=1.0)))
+    assert found["plc_door_open"]["platform"] == "binary_sensor"
+    assert found["plc_pressure"]["platform"] == "sensor"
+    assert "alarms" not in found
+
+
 def test_every_signal_there_is_can_be_announced_though_it_is_null() -> None:
     found = shown(fed(asked(home_assistant_entities_max=500), event(EventKind.BIRTH, 0.0, *every_signal())))
     classes = {name: (one.get("device_class"), one.get("unit_of_measurement")) for name, one in found.items()}

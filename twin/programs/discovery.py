@@ -64,6 +64,22 @@ def dialect_of(text: str, settings: Settings | None = None) -> Dialect:
     raise PartProgramError(first + 1, word, f'{reason}; choose one with dialect = "..." in [control] of machine.toml')
 
 
+def told_by_ending(text: str, ending: str, dialect: str | None) -> str | None:
+    """Return the name of the language of a program in a file: the one that is named, else the one that the ending is of.
+
+    The ending does not count where it is one of the first language's, which any G code has, or where the text is surely of
+    another language; None where it tells nothing, so that the text decides.
+
+    >>> told_by_ending("T1 D1 M6", ".MPF", None)
+    'sinumerik'
+    """
+    owner = next((one.name for one in dialects().values() if ending.casefold() in one.suffixes), None)
+    if dialect is not None or owner is None or owner == next(iter(dialects())):
+        return dialect
+    sure = [name for name, certainty in _certainties(text[:RECOGNISED_CHARACTERS_MAX]).items() if certainty >= 1.0]
+    return owner if not sure or owner in sure else None
+
+
 @lru_cache(maxsize=256)
 def _certainties(head: str) -> dict[str, float]:
     """How sure each language is of the beginning of a text."""

@@ -101,7 +101,7 @@ RULES = (
 )
 RULE_DETAIL = f"{RULE_PREFIX}detail"
 RULE_FINDINGS = f"{RULE_PREFIX}findings"
-"""JSON text: by the name of each rule that alarms value, limit, unit and since when (ms), as of the moment it was raised."""
+"""JSON text: by the name of each rule that alarms value, limit, unit, since when (ms), and the signal to look at."""
 SEVERITY = f"{TWIN_PREFIX}severity"
 
 # control_alarms

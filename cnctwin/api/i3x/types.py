@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from cnctwin.api.fleet import SHOWN
 from cnctwin.api.value_object import Plain
 from processors.outputs import declared_outputs, kind_of
-from twin.vocabulary.signals import AXES, SIGNALS, Kind, canonical
+from twin.vocabulary.signals import AXES, CHOSEN, PLC_PREFIX, SIGNALS, VARIABLE_PREFIX, Kind
 from twin.vocabulary.twin_signals import live_name
 
 I3X = "https://cesmii.org/i3x"
@@ -97,13 +97,15 @@ def object_types() -> dict[str, ObjectType]:
 def type_of(signal: str, known: dict[str, ObjectType] | None = None) -> ObjectType:
     """Return the object type of a machine's signal.
 
-    >>> type_of("spindle_rpm").element_id, type_of("axis_x_pos_mm").element_id, type_of("coolant level").element_id
-    ('type/spindle_rpm', 'type/axis_pos_mm', 'type/SparkplugMetric')
+    >>> [type_of(name).element_id for name in ("spindle_rpm", "axis_x_pos_mm", "plc_door", "coolant level")]
+    ['type/spindle_rpm', 'type/axis_pos_mm', 'type/plc', 'type/SparkplugMetric']
     """
     types = object_types() if known is None else known
     name = live_name(signal) or signal
-    if name not in SIGNALS and canonical(name) is not None:
+    if any(pattern.fullmatch(name) for pattern, _ in AXES):
         name = _axis_name(name)
+    elif any(pattern.fullmatch(name) for pattern, _ in CHOSEN):
+        name = name.partition("_")[0]
     return types.get(f"type/{name}", _METRIC)
 
 
@@ -112,6 +114,10 @@ def _signal_types() -> Iterator[ObjectType]:
         yield _signal_type(signal.name, _OF_KIND[signal.kind], signal.unit, signal.meaning)
     for pattern, signal in AXES:
         yield _signal_type(_axis_name(pattern.pattern), _OF_KIND[signal.kind], signal.unit, signal.meaning)
+    for prefix, (_, signal) in zip((VARIABLE_PREFIX, PLC_PREFIX), CHOSEN, strict=True):
+        name = prefix.removesuffix("_")
+        schema = {"type": ["boolean", "number"], "description": signal.meaning}
+        yield ObjectType(f"type/{name}", name, VOCABULARY, name, schema)
     for output in declared_outputs().values():
         yield _signal_type(output.name, _OF_KIND[kind_of(output)], output.unit or "", output.meaning)
 

@@ -36,6 +36,7 @@ def draft(url: str, device: str = "") -> str:
         "",
         "[heidenhain]",
         f'url = "{url}"',
+        f"# tool_table = '{_tool_table(control)}'  # length, radius, wear and age of the tool (docs/edge-heidenhain.md)",
         *_clock_lines(sweep),
         "",
         "# Told by the control:",
@@ -46,9 +47,6 @@ def draft(url: str, device: str = "") -> str:
     lines += ["# Not told now, and why:"]
     lines += [f"#   {offer.signal}: {_one_line(last[offer.signal].reason or '')[:120]}" for offer in silent] or ["#   none"]
     lines += [
-        "",
-        "# Length, radius, wear and age of the tool: read from the control's table, if you name it (docs/edge-heidenhain.md):",
-        f"# [heidenhain] tool_table = '{_tool_table(control)}'",
         "",
         "# The addresses are the machine builder's: ask for his PLC lists, or see them on the control (docs/edge-heidenhain.md).",
         "# [heidenhain.plc]",

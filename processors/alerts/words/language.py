@@ -6,6 +6,7 @@ Templates are rendered in Jinja2's sandbox: they see values, no objects of ours,
 
 import tomllib
 from collections.abc import Mapping
+from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -104,6 +105,9 @@ def language_in(path: Path) -> Language:
 def _read(text: str) -> Language:
     own: dict[str, Any] = tomllib.loads(text)
     english = tomllib.loads((files(__package__) / f"{ENGLISH}{SUFFIX}").read_text(encoding="utf-8"))
+    for name in own.get("alerts", {}):
+        if name not in english["alerts"] and (near := get_close_matches(name, english["alerts"], 1, 0.85)):
+            raise ValueError(f"alerts.{name} is no alert; did you mean {near[0]}?")
     return Language.model_validate(_over(english, own))
 
 

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple, NoReturn
 from urllib.parse import quote
 from zoneinfo import ZoneInfo
 
-from jinja2 import Template, TemplateError, Undefined, UndefinedError
+from jinja2 import Template, TemplateError, Undefined, UndefinedError, meta
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+from processors.alerts.lag import PLANT
 from processors.alerts.state import Alert, Phase, Severity
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
 from twin.vocabulary.twin_signals import RULE_PREFIX, RULE_VIBRATION, TWIN_PREFIX
@@ -23,6 +24,16 @@ SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError,
 """Whatever a template of somebody's own may run into."""
 
 
+KNOWN = frozenset(
+    {
+        *("kind", "alerts", "first", "count", "others", "machines", "notes", "who", "machine", "alert", "name", "signal_name"),
+        *("severity", "is_on", "acknowledged_by", "unknown", "since", "ended", "lasting", "for_lasting", "why", "value", "limit"),
+        *("unit", "lasted_s", "line", "signal", "side", "away", "away_unit", "against", "parts", "line_from", "line_to", "like"),
+        *("likeness", "peers", "what_grows", "what_drifts", "left", "left_low", "left_high", "program", "tool", "control"),
+        *("control_alarm", "sentence"),
+    }
+)
+"""The names that a template may use; a language of somebody's own that uses another is refused."""
 TRIAL = Alert("machine", RULE_VIBRATION.removeprefix(TWIN_PREFIX), RULE_VIBRATION, "", Severity.HIGH, 0, Phase.FIRING)
 """The alert with which templates of somebody's own are tried."""
 
@@ -56,7 +67,7 @@ class Wording:
 
     def __init__(self, words: Language, time_zone: str = "UTC", external_url: str = "") -> None:
         self._words, self._zone, self._page = words, ZoneInfo(time_zone), external_url.rstrip("/")
-        environment = ImmutableSandboxedEnvironment(undefined=Missing, autoescape=False, trim_blocks=False)
+        self._environment = environment = ImmutableSandboxedEnvironment(undefined=Missing, autoescape=False, trim_blocks=False)
         form = words.form
         environment.filters["number"] = lambda value, digits=3: number(value, form.decimal, digits)
         environment.filters["capitalized"] = lambda text: f"{text[:1].upper()}{text[1:]}"
@@ -64,7 +75,11 @@ class Wording:
         self._templates = {text: _compiled(environment, where, text) for where, text in _templates_of(words)}
 
     def tried(self) -> "Wording":
-        """Return it, once its title and its text could be filled. Raises ValueError naming the one that could not."""
+        """Return it, once each template names only what there is, and title and text could be filled. Raises ValueError."""
+        for text, where in {text: where for where, text in _templates_of(self._words)}.items():
+            unknown = meta.find_undeclared_variables(self._environment.parse(text)) - KNOWN - {"range"}
+            if unknown:
+                raise ValueError(f"{where}: {sorted(unknown)[0]!r} is not known; docs/alerts.md lists what a template sees")
         told = self._of_notice((TRIAL,), (), Occasion(0.0))
         for where, text in (("title", self._words.title), ("text", self._words.text)):
             try:
@@ -245,11 +260,12 @@ def duration(seconds: float, form: Form) -> str:
 
 
 def link(page: str, alert: Alert) -> str:
-    """Return the address of ten minutes around the beginning of an alert on the page."""
-    if not page or not alert.signal:
+    """Return the address of ten minutes around the beginning of an alert on the page, with the signal that shows it."""
+    if not page or alert.machine == PLANT:
         return page
-    at_ms = alert.episode
-    return f"{page}/#/replay/{quote(alert.machine, safe='')}?from={at_ms - SHOWN_MS}&to={at_ms + SHOWN_MS}&at={at_ms}"
+    at_ms, signal = alert.episode, alert.facts.get("signal", "")
+    shown = f"&signal={quote(str(signal), safe='')}" if signal else ""
+    return f"{page}/#/replay/{quote(alert.machine, safe='')}?from={at_ms - SHOWN_MS}&to={at_ms + SHOWN_MS}&at={at_ms}{shown}"
 
 
 @cache

@@ -111,3 +111,13 @@ def test_a_csv_has_a_field_for_each_column_and_reads_back(by: By) -> None:
         assert named["program"] == '\'=HYPERLINK("x"),y\nz'
     else:
         assert (named["begin"], named["oee"]) == ("1970-01-01T00:00:00Z", "0.675")
+
+
+def test_a_machines_figures_are_of_its_shifts_and_not_of_what_was_made_outside_them() -> None:
+    outside = _shift(2, "b", shift=None, planned_s=0.0, production_s=0.0, setup_s=0.0, delay_s=0.0, down_s=0.0, beside_s=600.0)
+    parts = [*(_part(n) for n in range(3)), *(_part(n, 2, shift=None) for n in range(5))]
+    (alone,) = table([_shift()], parts[:3], Asked(By.MACHINE, 0, 9 * HOUR_MS))
+    (both,) = table([_shift(), outside], parts, Asked(By.MACHINE, 0, 9 * HOUR_MS))
+    assert {name: both[name] for name in ("parts", "performance", "oee", "shifts")} == {
+        name: alone[name] for name in ("parts", "performance", "oee", "shifts")
+    }

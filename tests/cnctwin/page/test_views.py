@@ -378,7 +378,8 @@ def test_a_machine_without_a_spindle_temperature_opens_on_what_it_has(visit: Vis
     expect(page.locator(".panel.own .name")).to_have_text("Spindle load, %")
     expect(page.get_by_label("Signal to chart")).to_have_value("spindle_load_pct")
     expect_drawn(page, ".panel.own canvas")
-    page.locator('[data-tile="spindle_temp_c"]').click()
+    expect(page.locator('[data-tile="spindle_temp_c"]')).to_be_hidden()
+    page = visit.open("#/machine/vmc?signal=spindle_temp_c")
     expect(page.get_by_label("Signal to chart")).to_have_value("spindle_temp_c")
     expect(page.locator(".panel.own .why")).to_contain_text("not offered by this machine")
 

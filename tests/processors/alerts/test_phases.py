@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from processors.alarms import alarm_signals
+from processors.alerts.body import iso
 from processors.alerts.config import AlertsConfig
 from processors.alerts.processor import PROCESSOR
 from processors.discovery import discover
@@ -128,6 +129,8 @@ def test_a_machine_that_is_offline_keeps_its_alerts_and_is_one_itself() -> None:
     shop.rows["okuma"] = row
     shop.wait(70)
     assert shop.alert("machine_offline")["phase"] == "resolved"
+    back_after_s = 20 + 30 + 40
+    assert shop.alert("machine_offline")["endsAt"] <= iso(round((T0_S + back_after_s + 1) * 1000))  # not when its dwell was over
 
 
 def test_a_machine_offline_for_less_than_its_dwell_wakes_nobody() -> None:

@@ -65,7 +65,7 @@ class Flow:
         """One more jump backwards, loop or call. RefusedError where there are too many: the program has no end."""
         self.jumps += 1
         if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; Settings.jumps_max")
+            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
 
     def statement(self, block: Block) -> None:
         """Run a block that is no list of words; `at` of the level is the block's own line."""

@@ -50,7 +50,7 @@ class Flow:
         """One more jump or call. RefusedError where there are too many: the program has no end."""
         self.jumps += 1
         if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; Settings.jumps_max")
+            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
 
     def deeper(self, word: str) -> None:
         self.count()

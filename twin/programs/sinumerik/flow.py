@@ -75,7 +75,7 @@ class Flow:
         """One more jump, loop or call. RefusedError where there are too many: the program has no end."""
         self.jumps += 1
         if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; Settings.jumps_max")
+            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
 
     def jump(self, target: Target) -> None:
         """Go on at a label or a block number of the running program; GOTOC goes on behind its block where there is none."""

@@ -44,7 +44,7 @@ export const TILES = [
 /** A tile as this machine has it, or null where it has none of its signals. */
 export function tileOf(machine, tile) {
   const own = tile.own.find((signal) => machine.values.has(signal)) ?? null;
-  if (own === null && !(tile.twin && machine.values.has(tile.twin))) return null;
+  if (own === null && !(tile.twin && typeof machine.bare(tile.twin) === "number")) return null;
   const twin = tile.twin && machine.values.has(tile.twin) ? tile.twin : null;
   return {
     ...tile,
@@ -55,6 +55,18 @@ export function tileOf(machine, tile) {
     learned: tile.learned && typeof machine.bare(tile.learned) === "number" ? tile.learned : null,
   };
 }
+
+/** The signal that a machine opens on: the first tile that has a figure of its own, else another measured one, else the twin's. */
+export function firstOf(machine) {
+  const has = (signal) => typeof machine.bare(signal) === "number" || machine.series.get(signal) instanceof Ring;
+  const [measured, twin] = numbers(machine),
+    tile = TILES.find((one) => has(tileOf(machine, one)?.own));
+  const first = (names) => names.find((signal) => has(signal) && !SAYS_LITTLE.test(signal)) ?? names.find(has);
+  return tile?.id ?? first(measured) ?? first(twin) ?? measured[0] ?? twin[0] ?? null;
+}
+
+/** Positions, overrides, clocks and what an edge counts say little over time; they are charted last. */
+const SAYS_LITTLE = /_pos_(mm|deg)$|_override_pct$|^clock_|^edge_/;
 
 /** The same for any signal of the machine. */
 export function chartOf(machine, id) {

@@ -209,9 +209,9 @@ export function age(ms) {
 
 /** A stretch of time from a number of ms. */
 export function duration(ms) {
-  const s = ms / 1000;
+  const s = ms < 59500 ? ms / 1000 : Math.round(ms / 1000);
   if (s < 60) return `${digits(s, 3)} s`;
-  if (s < 3600) return `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ${s % 60} s`;
   return `${Math.floor(s / 3600)} h ${String(Math.floor((s % 3600) / 60)).padStart(2, "0")} min`;
 }
 

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cnctwin.api.i3x.elements import PLANT_ID, Place, machine_id, place_of, signal_id
+from cnctwin.api.i3x.types import type_of
 
 NAMES = st.text(min_size=1, max_size=60)
 
@@ -24,3 +25,11 @@ def test_what_is_written_otherwise_names_nothing(text: str) -> None:
     if place is not None:
         ids = {signal_id(*place) if place.signal else machine_id(place.machine) if place.machine else PLANT_ID}
         assert ids == {text}
+
+
+def test_a_variable_and_a_plc_address_of_any_name_have_a_type_of_their_own() -> None:
+    assert [type_of(name).element_id for name in ("plc_mark", "plc_door_open", "variable_parts")] == [
+        "type/plc",
+        "type/plc",
+        "type/variable",
+    ]

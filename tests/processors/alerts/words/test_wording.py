@@ -25,7 +25,18 @@ WHY = {
 def findings(shop: Shop, load_pct: float) -> str:
     """The findings of a rule that was raised two seconds after its condition began."""
     since_ms = round(shop.wall_s * 1000) - 2000
-    return json.dumps({"load_over_limit": {"value": load_pct, "limit": 100.0, "unit": "%", "since": since_ms, "line": 210}})
+    return json.dumps(
+        {
+            "load_over_limit": {
+                "value": load_pct,
+                "limit": 100.0,
+                "unit": "%",
+                "since": since_ms,
+                "line": 210,
+                "signal": "spindle_load_pct",
+            }
+        }
+    )
 
 
 def overloaded(**table: Any) -> Shop:
@@ -45,7 +56,10 @@ def test_the_first_line_says_what_is_wrong_with_which_machine_and_the_next_what_
         "Check the tool for wear and packed chips, and the feed and its override.",
     ]
     (alert,) = told.body["alerts"]
-    assert alert["generatorURL"] == f"{PAGE}/#/replay/okuma?from=1794999700000&to=1795000300000&at=1795000000000"
+    assert (
+        alert["generatorURL"]
+        == f"{PAGE}/#/replay/okuma?from=1794999700000&to=1795000300000&at=1795000000000&signal=spindle_load_pct"
+    )
     told_facts = {name: alert["annotations"][name] for name in ("value", "limit", "unit", "program", "tool", "line")}
     assert told_facts == {"value": "112.04", "limit": "100", "unit": "%", "program": "O1701", "tool": "1", "line": "210"}
 

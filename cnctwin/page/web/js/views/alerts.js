@@ -201,6 +201,19 @@ export function open(app) {
     );
   }
 
+  /** What the controls themselves show: no alert of ours, and what the head of a machine leads to. */
+  function controls() {
+    const showing = [...app.plant.machines.values()].filter((one) => one.online && one.good("alarm"));
+    if (!showing.length) return null;
+    const rows = showing.map((one) => [el("a", { href: app.address("machine", one.name) }, one.name), String(one.good("alarm"))]);
+    return el(
+      "section",
+      {},
+      el("h2", {}, `Shown by the controls (${rows.length})`),
+      table(["Machine", "Alarm"], rows, { label: "Shown by the controls" }),
+    );
+  }
+
   function receivers(given, failures) {
     const entries = Object.entries(given ?? {});
     if (!entries.length)
@@ -246,6 +259,7 @@ export function open(app) {
       given.receivers,
       given.failures,
       given.available,
+      [...app.plant.machines.values()].map((one) => one.good("alarm")),
       Math.floor(serverNow() / 30000),
     ]);
     if (key === shown) return;
@@ -283,6 +297,7 @@ export function open(app) {
         block("Acknowledged", cards(of("acknowledged"))),
         block("Pending", cards(of("pending"))),
         given.alerts_not_shown ? el("p", { class: "note" }, `${given.alerts_not_shown} more are not shown.`) : null,
+        controls(),
         silences(given.silences ?? []),
         block("Over", cards(of("resolved").slice(0, RESOLVED_MAX))),
         known ? receivers(given.receivers, given.failures) : null,

@@ -2,7 +2,7 @@
 
 import { parsed } from "../anomaly_words.js";
 import { get, part, query } from "../api.js";
-import { CONTEXT, SCORES, TILES, chartOf, numbers, tileOf } from "../charted.js";
+import { CONTEXT, SCORES, TILES, chartOf, firstOf, numbers, tileOf } from "../charted.js";
 import { el, setHidden, setText } from "../dom.js";
 import { atMost, onFrame, offFrame } from "../frame.js";
 import { Panels } from "../panels.js";
@@ -22,17 +22,6 @@ const WINDOWS = [
   [300000, "5 min"],
   [900000, "15 min"],
 ];
-
-/** The signal that a machine opens on: the first tile that has a figure of its own, else another measured one, else the twin's. */
-function opened(machine, measured, twin) {
-  const has = (signal) => typeof machine.bare(signal) === "number" || machine.series.has(signal);
-  const tile = TILES.find((one) => has(tileOf(machine, one)?.own));
-  const first = (names) => names.find((signal) => has(signal) && !isPlace(signal)) ?? names.find(has);
-  return tile?.id ?? first(measured) ?? first(twin) ?? measured[0] ?? twin[0] ?? null;
-}
-
-/** Positions and overrides say little over time; they are charted last. */
-const isPlace = (signal) => /_pos_(mm|deg)$|_override_pct$|^clock_/.test(signal);
 
 export function open(app, { machine: named, search }) {
   const name = app.pick(named);
@@ -171,7 +160,7 @@ export function open(app, { machine: named, search }) {
           )
         : null;
     select.replaceChildren(...[group("Measured", measured), group("Twin", twin)].filter(Boolean));
-    const shown = asked ?? opened(machine, measured, twin);
+    const shown = asked ?? firstOf(machine);
     if (shown !== null) choose(shown);
   }
 

@@ -2,7 +2,7 @@
 // and whether the processors, run again over the stored messages, give what they published then.
 
 import { get, part } from "../api.js";
-import { TILES, chartOf, tileOf } from "../charted.js";
+import { TILES, chartOf, firstOf, tileOf } from "../charted.js";
 import { serverNow } from "../clock.js";
 import { el, say, setHidden, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
@@ -220,7 +220,8 @@ export function open(app, { machine: named, search }) {
         .map(([one]) => one)
         .sort(),
     ];
-    signal = names.includes(signal) ? signal : (names[0] ?? null);
+    const first = firstOf(past);
+    signal = names.includes(signal) ? signal : names.includes(first) ? first : (names[0] ?? null);
     choose.replaceChildren(
       ...names.map((one) => el("option", { value: one }, TILES.find((tile) => tile.id === one)?.name ?? title(one))),
     );
