@@ -3,6 +3,7 @@
 A line is a source line; all its executions share one feed and one speed. What is left alone, and why, stands in `left_alone`:
 
 * its feed does not come from an F word in mm/min: tied to the spindle (G95, tapping), part of a cycle, or an expression
+* its feed at the tool's centre is not the F word: an arc beside which the control keeps F at the contour (CFC, M109)
 * it goes down into material: the cutting formula has no end face
 * its tool is not described
 """
@@ -21,7 +22,7 @@ from twin.errors import MachineError, OptimisationError
 from twin.machine import MachineFile, Tool
 from twin.motion.path import Kind, Path, path_from_moves
 from twin.optimisation.spring_passes import touching
-from twin.programs import Arc, Linear
+from twin.programs import Arc, Linear, Move
 from twin.programs.dialect import Dialect, SourceWords
 from twin.programs.discovery import dialect_of
 from twin.programs.source import source_lines
@@ -36,7 +37,9 @@ CLEARANCE_MM = 1.0
 SHALLOW = 0.02
 """Down to this slope, 1.1°, a ramp is taken for a level cut: its end face takes a fiftieth of the feed."""
 DIGITS, HEADING_STEPS = 6, 24
+SAME_RATIO = 1e-9
 NEAR = "it feeds close to the work without cutting: an approach"
+AT_CONTOUR = "its feed at the tool's centre is not the F word: the control keeps F at the contour"
 SPRING = "it runs along the work and cuts nothing by its plan: a spring pass"
 
 
@@ -49,6 +52,7 @@ class FeedLine:
     needs_speed: it is left alone, and needs the speed that it was written for
     plunges: its end face cuts
     inch: its F word counts inch/min; plain_feed: its feed is a length a minute, so that an F word of its own says the same
+    feed_ratio: its feed over its F word, at its first motion
     """
 
     line: int
@@ -64,6 +68,12 @@ class FeedLine:
     plunges: bool = False
     inch: bool = False
     plain_feed: bool = True
+    feed_ratio: float = 1.0
+
+    @property
+    def word_mm_min(self) -> float:
+        """The F word that gives its feed."""
+        return self.feed_mm_min / self.feed_ratio
 
     @property
     def cutting(self) -> bool:
@@ -145,6 +155,7 @@ def programmed(
         collisions = tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
+    ratios = _feed_ratios(moves)
     source = source_lines(text)
     _check_branches(source, words, {move.line for move in moves})
     inch = words.inch_lines(source, machine.settings.inch)
@@ -161,10 +172,10 @@ def programmed(
             found = _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
         one = FeedLine(
             line, executions, int(numbers[segments[0]]), float(path.feed_mm_min[segments[0]]), float(speeds[segments[0]]),
-            float(path.length_mm[segments].sum()), found.cut_mm, (0, 0),
+            float(path.length_mm[segments].sum()), found.cut_mm, (0, 0), feed_ratio=ratios[line][0],
         )  # fmt: skip
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
-        why = why or _by_its_words(source[line], words, speeds[segments], len(found.rows) > 0)
+        why = why or _at_contour(ratios[line]) or _by_its_words(source[line], words, speeds[segments], len(found.rows) > 0)
         if not len(found.rows) and not _is_clear(machine, path, segments, tools, int(numbers[segments[0]])):
             why = why or NEAR
             near[len(lines)] = segments
@@ -175,7 +186,7 @@ def programmed(
                 left_alone=why,
                 needs_speed=bool(why) and not in_air,
                 inch=inch[line],
-                plain_feed=_is_plain_feed(source[line], words, one.feed_mm_min, inch[line], line in tied),
+                plain_feed=_is_plain_feed(source[line], words, one.word_mm_min, inch[line], line in tied),
             )
         )
         groups.append(found.rows)
@@ -184,6 +195,20 @@ def programmed(
     return _numbered(
         Programmed(machine, text, dialect, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
     )
+
+
+def _feed_ratios(moves: Sequence[Move]) -> dict[int, list[float]]:
+    """Each source line that feeds → its motions' feeds over the F word."""
+    ratios: dict[int, list[float]] = {}
+    for move in moves:
+        if isinstance(move, Linear | Arc):
+            ratios.setdefault(move.line, []).append(move.feed_ratio if isinstance(move, Arc) else 1.0)
+    return ratios
+
+
+def _at_contour(ratios: Sequence[float]) -> str:
+    """Why a line is left alone whose feed is not its F word; empty = it is."""
+    return AT_CONTOUR if any(abs(ratio - 1.0) > SAME_RATIO for ratio in ratios) else ""
 
 
 def _with_spring_passes(lines: list[FeedLine], near: Mapping[int, Ints], touches: Sequence[bool]) -> list[FeedLine]:

@@ -68,8 +68,19 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
         forced_feed |= more_feed
         forced_speed |= more_speed
     carriers = {program.lines[k].line for k in problem.groups.carriers}
-    why = {line: f"its {what} does not follow the word that was written" for line, what in missed.items() if line not in carriers}
+    why = dict(_at_fault(problem, source, line, what) for line, what in missed.items() if line not in carriers)
     return Rewritten(text, path, why or _changed_between(problem, path))
+
+
+def _at_fault(problem: Problem, source: list[str], number: int, what: str) -> tuple[int, str]:
+    """The line to be left alone for one that was missed, and why: itself, or the line before a call that takes no word."""
+    words, order = problem.program.words, _order(problem)
+    if words.with_feed(source[number], "1") == source[number] and words.feed_place(source[number]) is None and number in order:
+        free = {line.line for line in problem.program.lines if not line.left_alone}
+        for before in reversed(order[: order.index(number)]):
+            if before in free:
+                return before, f"line {number + 1} behind it needs its {what} as it is, and takes no word of its own"
+    return number, f"its {what} does not follow the word that was written"
 
 
 def _changed_between(problem: Problem, path: Path) -> dict[int, str]:
@@ -178,16 +189,41 @@ def _changed(
         changed[number] = words.with_speed(source[number], figure)
     programmed = {line.line: line for line in problem.program.lines}
     for number, one in wanted.items():
+        if words.feed_place(source[number]) is None and words.with_feed(source[number], "1") == source[number]:
+            _before_call(changed, source, number, one.speed if number in speeds else None, number in feeds, problem)
+            continue
         text = changed.get(number, source[number])
         if number in feeds:
             # a line that is left alone gets the feed it was written for, which its modes would no longer give it
             line = programmed[number]
-            text = words.with_feed(text, one.feed or words.exact_feed_figure(line.feed_mm_min, line.inch))
+            text = words.with_feed(text, one.feed or words.exact_feed_figure(line.word_mm_min, line.inch))
         if number in speeds and one.speed is not None:
             text = words.with_speed(text, one.speed)
         if text != source[number]:
             changed[number] = text
     return changed
+
+
+def _before_call(
+    changed: dict[int, str], source: list[str], number: int, speed: str | None, with_feed: bool, problem: Problem
+) -> None:
+    """Write the words that a line needs and cannot have into a rapid between it and the feed line before it, if there is one."""
+    words, by_line = problem.program.words, {line.line: line for line in problem.program.lines}
+    rapids = {int(line) for line in problem.program.path.line} - by_line.keys()
+    marks = words.branches(source)
+    before = number - 1
+    while before >= 0 and before not in by_line and before not in rapids and words.speed_place(source[before]) is None:
+        before -= 1
+    if before not in rapids or any(marks[before:number]) or words.with_speed(source[before], "1") == source[before]:
+        return
+    text = changed.get(before, source[before])
+    line = by_line[number]
+    if with_feed and line.plain_feed and words.feed_place(text) is None:
+        text = words.with_feed(text, words.exact_feed_figure(line.word_mm_min, line.inch))
+    if speed is not None and words.speed_place(text) is None:
+        text = words.with_speed(text, speed)
+    if text != source[before]:
+        changed[before] = text
 
 
 def _missed(problem: Problem, path: Path, wanted: dict[int, _Wanted]) -> dict[int, str]:

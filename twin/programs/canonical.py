@@ -3,8 +3,8 @@
 All lengths are in mm, feeds in mm/min, in machine coordinates: work offset, tool length and cutter compensation are in. Rotary
 axes, where configured, follow in degrees. The idea is that of the canonical machining functions of RS274/NGC (NIST IR 6556).
 
-The first field of each is `line`, the 0-based index of its source line in the main text (as recorders count blocks). The last is
-`program`: None in the main text; in a subprogram that has a text of its own its name, and `line` counts in that text.
+The first field of each is `line`, the 0-based index of its source line in the main text (as recorders count blocks). Every
+one has `program`: None in the main text; in a subprogram that has a text of its own its name, and `line` counts in that text.
 """
 
 from typing import NamedTuple
@@ -42,6 +42,7 @@ class Arc(NamedTuple):
     plane: 17, 18 or 19
     sweep_rad: + counter-clockwise seen from the plane's positive normal; beyond 2π for several turns
     feed_mm_min: along the helix
+    feed_ratio: the feed of the tool's centre over the F word, where the control keeps F at the contour (CFC, M109)
     """
 
     line: int
@@ -52,6 +53,7 @@ class Arc(NamedTuple):
     feed_mm_min: float
     feed_per_rev_mm: float | None = None
     program: str | None = None
+    feed_ratio: float = 1.0
 
 
 class Dwell(NamedTuple):

@@ -85,7 +85,7 @@ def plain_blocks(
             except RefusedError:
                 break  # The long way says it with line and word.
             end, middle = (new_x, new_y, new_z), (centre[0], centre[1], z)
-            put(new(Arc, (at, end, middle, 17, swept.sweep_rad, new_feed, None, program)))
+            put(new(Arc, (at, end, middle, 17, swept.sweep_rad, new_feed, None, program, 1.0)))
         elif moves:
             if mode == 1 and new_feed > 0.0:
                 put(new(Linear, (at, (new_x, new_y, new_z), new_feed, None, program)))

@@ -68,7 +68,8 @@ def at_the_edge(state: State, move: Motion) -> Motion:
     shifted = parallel(programmed, state.left_mm)
     if shifted is None or (state.edge_feed is EdgeFeed.INNER_ARCS and shifted.radius > programmed.radius):
         return move
-    return move._replace(feed_mm_min=move.feed_mm_min * shifted.radius / programmed.radius)
+    ratio = shifted.radius / programmed.radius
+    return move._replace(feed_mm_min=move.feed_mm_min * ratio, feed_ratio=ratio)
 
 
 def leave_open(state: State) -> None:

@@ -82,7 +82,7 @@ def contour_feed(state: State, move: Arc, left: float) -> Arc:
     if mode == "CFTCP" or ratio <= 0.0 or (mode == "CFIN" and ratio > 1.0):
         return move
     per_rev = None if move.feed_per_rev_mm is None else move.feed_per_rev_mm * ratio
-    return move._replace(feed_mm_min=move.feed_mm_min * ratio, feed_per_rev_mm=per_rev)
+    return move._replace(feed_mm_min=move.feed_mm_min * ratio, feed_per_rev_mm=per_rev, feed_ratio=ratio)
 
 
 def after_move(state: State, start: Position) -> None:

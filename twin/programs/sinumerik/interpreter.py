@@ -202,6 +202,9 @@ class Interpreter:
             flow.modal = statement.modal
             return True
         words = evaluated(statement.parts, self.variables, flow.assign)
+        beside = next(iter([*words.written.values(), *(one.text for name, one in words.values.items() if name != "P")]), None)
+        if words.calls and beside is not None:
+            raise RefusedError(beside, f"stands beside the call of {words.calls[0].name}; a call has a block of its own")
         moved = modes.execute(state, words)
         if len(words.calls) > 1:
             raise RefusedError(words.calls[1].text, "a block calls one subprogram or cycle")

@@ -26,6 +26,11 @@ NO_BRANCH: Final = frozenset({"DEF", "EXTERN"})
 CALLS_NOTHING: Final = re.compile(
     r"(?:CYCLE[0-9]+|HOLES[12]|POCKET[1-4]|SLOT[12]|LONGHOLE|MSG|WORKPIECE|FGROUP|GROUP_\w+|SETMS|STOPRE)$"
 )
+CALL: Final = re.compile(
+    r"[ \t]*+(?:/[0-9]?+[ \t]*+)?+(?:[N:][ \t]*+[0-9]++[ \t]*+)?+"
+    r"(?:MCALL\b|([A-Z_]{2}\w*+|L[0-9]++)[ \t]*+(?:$|;|\(|P[ \t]*+=?[ \t]*+[0-9]))"
+)
+"""A block that calls a subprogram or a cycle: it stands there by itself, with P at most."""
 NUMBER: Final = re.compile(rf"[-+]?+[ \t]*+{PLAIN}")
 
 
@@ -101,6 +106,17 @@ def with_word(line: str, letter: str, figure: str) -> str:
     return line[:end] + gap + letter + figure + line[end:]
 
 
+def stands_alone(line: str) -> bool:
+    """Return True for a block that takes no further word: a call, or a jump and its like.
+
+    >>> [stands_alone(line) for line in ("N9 POCKET3(5,0)", "MCALL CYCLE81(5,0)", "L100 P2", "SUPA", "X=IC(5)", "GOTOF LAB")]
+    [True, True, True, False, False, True]
+    """
+    names = {piece.text for piece in pieces(line) if piece.group == 4}
+    found = CALL.match(line.translate(CAPITALS))
+    return bool(names & STATEMENTS.keys()) or (found is not None and found[1] not in GROUPS)
+
+
 def feed_place(line: str) -> WordPlace | None:
     """Return the place of F."""
     return find_word(line, "F")
@@ -112,13 +128,13 @@ def speed_place(line: str) -> WordPlace | None:
 
 
 def with_feed(line: str, figure: str) -> str:
-    """Return the block with this F."""
-    return with_word(line, "F", figure)
+    """Return the block with this F; a call stays as it is."""
+    return line if stands_alone(line) else with_word(line, "F", figure)
 
 
 def with_speed(line: str, figure: str) -> str:
-    """Return the block with this S."""
-    return with_word(line, "S", figure)
+    """Return the block with this S; a call stays as it is."""
+    return line if stands_alone(line) else with_word(line, "S", figure)
 
 
 def codes(line: str) -> frozenset[str]:

@@ -84,6 +84,8 @@ from twin.errors import PartProgramError
         ("G41 G1 X5 F100", "G41", "write T and M6"),
         ("OVR=50", "OVR=50", "only 100 %"),
         ("G450 DISC=50", "DISC=50", "only DISC=0"),
+        ("CYCLE81(10,0,2,-5) G1 X50", "G1", "a call has a block of its own"),
+        ("CYCLE81(10,0,2,-5) S5000", "S5000", "a call has a block of its own"),
         ("CYCLE81(10,0,2)", "CYCLE81 DP", "the depth"),
         ("CYCLE81(10,0,2,5)", "CYCLE81 DP", "61101"),
         ("CYCLE81(10,10,2,,5)", "CYCLE81 DPR", "61101"),

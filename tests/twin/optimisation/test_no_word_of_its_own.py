@@ -1,0 +1,58 @@
+"""Lines whose feed is not their F word, or that take no word: arcs at the feed of the contour, and calls."""
+
+import pytest
+
+from tests.twin.optimisation.test_languages import MACHINE, TOOLS
+from twin.optimisation.answer import Optimised
+from twin.optimisation.optimise import optimise
+from twin.optimisation.program import AT_CONTOUR
+from twin.optimisation.question import Question
+from twin.programs.source import source_lines
+
+HEAD = "G17 G90 G71\nT1 M6\nD1\nS5000 M3\nG0 X0 Y20\nZ0\n"
+CONTOUR = HEAD + "G1 G41 X25 Y30 F600\nY79\nG2 X31 Y85 CR=6\nG1 X109\nG2 X115 Y79 CR=6\nG1 Y35\nG40 X130 Y20\nG0 Z50\nM30\n"
+KLARTEXT = """0 BEGIN PGM A MM
+1 TOOL CALL 1 Z S5000
+2 L X0 Y20 R0 FMAX M3
+3 L Z0 R0 FMAX
+4 L X+25 Y+30 RL F600 M109
+5 L Y+79
+6 CR X+31 Y+85 R+6 DR-
+7 L X+109
+8 CR X+115 Y+79 R+6 DR-
+9 L Y+35
+10 L X+130 Y+20 R0
+11 L Z+50 R0 FMAX M30
+12 END PGM A MM
+"""
+POCKET = "POCKET3(50,6,2,-2,60,50,12,70,60,0,3,0.2,0.1,700,150,0,11,6)"
+CALL = HEAD + "Y35\nG1 X130 F600\n{}\n" + POCKET + "\nG0 X0 Y80\nZ0\nG1 X130 F600\nG0 Z50\nM30\n"
+
+
+def answer(text: str, name: str, **changes: object) -> Optimised:
+    short = {"evolutions": 1, "population": 8, "islands": 1, **changes}
+    return optimise(Question(text, MACHINE + TOOLS, name=name).with_(**short), resimulate=False)
+
+
+@pytest.mark.parametrize(("text", "name", "arcs"), [(CONTOUR, "a.mpf", (8, 10)), (KLARTEXT, "a.h", (6, 8))], ids=["CFC", "M109"])
+@pytest.mark.parametrize("left", [False, True], ids=["found out", "given with --leave"])
+def test_an_arc_at_the_feed_of_the_contour_keeps_its_f_word(text: str, name: str, arcs: tuple[int, ...], left: bool) -> None:
+    found = answer(text, name, left_alone=dict.fromkeys(arcs, "asked") if left else {})
+    alone = [one for one in found.lines if one.left_alone in (AT_CONTOUR, "asked")]
+    assert len(alone) == len(arcs)
+    for one in alone:
+        assert one.after.feed_mm_min == pytest.approx(one.before.feed_mm_min, rel=1e-6)
+        assert one.before.feed_mm_min > 700.0
+    written = source_lines(found.program)
+    assert [" F600" in written[arc] for arc in arcs] == [True, True]
+    assert found.after.seconds < found.before.seconds
+
+
+@pytest.mark.parametrize("between", ["G0 Z50", "G1 Z50"], ids=["a rapid takes its words", "the line before is left alone"])
+def test_a_call_gets_no_word(between: str) -> None:
+    found = answer(CALL.format(between), "a.mpf")
+    assert POCKET in source_lines(found.program)
+    cycle = next(one for one in found.lines if one.left_alone == "its feed is part of a cycle")
+    assert (cycle.after.feed_mm_min, cycle.after.spindle_rpm) == (cycle.before.feed_mm_min, 5000.0)
+    cut = next(one for one in found.lines if one.cut_mm > 0.0 and not one.left_alone)
+    assert cut.after.spindle_rpm != 5000.0
