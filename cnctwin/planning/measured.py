@@ -45,6 +45,7 @@ MEASURED = Measured(
     shared_us=72.7,
     each_us={
         "alerts": 10.6,
+        "control_alarms": 21.0,
         "cutting_force": 52.3,
         "events": 48.1,
         "expected": 54.0,
@@ -112,7 +113,9 @@ class MeasuredOnKafka:
 # With 100 machines at 10 Hz. A result is what all but the mirror cost beyond a message, over 1.1 results a message; a value is
 # what the mirror costs beyond it, over 11. `state_us` is that of cProfile, an upper bound: saving each second or each 30 s made
 # no difference beyond the noise of some per cent. Up to 1.2 cores were busy elsewhere while the mirror was measured, 0.2 else.
-# `production` was measured on 2026-11-28, on a busy computer, beside `events`: .82 of it.
+# `production` was measured on 2026-11-28, on a busy computer, beside `events`: .82 of it. `control_alarms` is what
+# `benchmarks.fleet --machines 40 --processors control_alarms` took that day less shared_us; on Kafka, the share
+# that `production` has.
 ON_KAFKA = MeasuredOnKafka(
     date="2026-11-24",
     computer="AMD EPYC, 2 cores, Kafka 4.3 and the load on them too",
@@ -124,6 +127,7 @@ ON_KAFKA = MeasuredOnKafka(
     read_us=11.9,
     fold_us={
         "alerts": 0.0,
+        "control_alarms": 7.5,
         "cutting_force": 49.7,
         "events": 21.5,
         "expected": 22.5,

@@ -131,7 +131,7 @@ def test_a_slice_of_it_through_the_real_process() -> None:
     assert result["in_time_pct"] > 50.0, "most values are in the mirror within a second, on a busy computer too"
     assert result["age_ms"]["count"] > 50 and 0.0 < result["age_ms"]["p50"] < 2_000.0
     assert result["used"]["processors"]["cores"] > 0.0
-    assert len(result["nodes"]) == 14
+    assert len(result["nodes"]) == 16
     assert {node: told["missing"] for node, told in result["nodes"].items()} == dict.fromkeys(result["nodes"], 0)
     assert result["nodes"]["twin-historian"]["store_samples"] > 500
     assert "twin-mirror" in result["nodes"] and result["nodes"]["twin-mirror"]["received"] > 70

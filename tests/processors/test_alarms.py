@@ -12,7 +12,15 @@ from processors.alerts.processor import PROCESSOR as ALERTS
 from processors.discovery import AnyProcessor, find
 from processors.events.processor import PROCESSOR as EVENTS
 from processors.historian import HistorianConfig
-from twin.vocabulary.twin_signals import ANOMALY_ALARM, GAP_GROWING, MACHINE_DRIFT, RULES, SCORE_DRIFT, TOOL_WEARS_FAST
+from twin.vocabulary.twin_signals import (
+    ANOMALY_ALARM,
+    CONTROL_ALARM,
+    GAP_GROWING,
+    MACHINE_DRIFT,
+    RULES,
+    SCORE_DRIFT,
+    TOOL_WEARS_FAST,
+)
 
 
 @pytest.fixture
@@ -34,7 +42,9 @@ def broken_rules(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def test_every_alarm_of_the_machine_pins_its_data_and_stands_in_the_records_of_its_parts() -> None:
     """The drift of a score is the model's, and asks for training."""
-    assert set(alarm_signals()) == {ANOMALY_ALARM, GAP_GROWING, MACHINE_DRIFT, SCORE_DRIFT, TOOL_WEARS_FAST, *RULES}
+    assert set(alarm_signals()) == {
+        *(ANOMALY_ALARM, CONTROL_ALARM, GAP_GROWING, MACHINE_DRIFT, SCORE_DRIFT, TOOL_WEARS_FAST, *RULES)
+    }
     assert unknown_processors() == ()
     assert set(machine_alarms()) == set(alarm_signals()) - {SCORE_DRIFT}
     assert HistorianConfig().flags == machine_alarms()
@@ -46,7 +56,7 @@ def test_a_processor_that_cannot_be_imported_is_named_once_and_the_others_alarms
     broken_rules: None, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
-        assert set(alarm_signals()) == {ANOMALY_ALARM, GAP_GROWING, MACHINE_DRIFT, SCORE_DRIFT, TOOL_WEARS_FAST}
+        assert set(alarm_signals()) == {ANOMALY_ALARM, CONTROL_ALARM, GAP_GROWING, MACHINE_DRIFT, SCORE_DRIFT, TOOL_WEARS_FAST}
         assert set(alarm_signals()) == set(machine_alarms()) | {SCORE_DRIFT}
     assert [one.getMessage() for one in caplog.records] == [
         "processor rules cannot be imported, its alarms are not known: ModuleNotFoundError: No module named 'spindles'"
