@@ -50,7 +50,7 @@ _PLACES = {
     "cnctwin.memory.store.contract": ("StoreError",),
     "twin.machine": ("MachineFile",),
 }
-"""Where each public name is; a test holds that this and what type checkers see above are the same."""
+"""The public names by the module that holds them; a test compares them with what type checkers see above."""
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __all__ = [

@@ -29,7 +29,7 @@ class By(StrEnum):
 
 
 class Asked(NamedTuple):
-    """What is asked for: shifts that begin, and parts that end, in [from_ms, to_ms)."""
+    """A question for figures: of shifts that begin, and parts that end, in [from_ms, to_ms)."""
 
     by: By
     from_ms: int

@@ -30,7 +30,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """How much of the gap the named causes are: healthy, explained, partly_explained or unknown."""
+        """Return the verdict on the gap: healthy, explained, partly_explained or unknown."""
         return self.answer.verdict
 
     @property

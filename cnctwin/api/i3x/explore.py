@@ -31,7 +31,7 @@ def explore_routes(space: Space, store: StoreReader) -> APIRouter:
 
     @router.get("/info")
     async def info() -> Json:
-        """What this server can do. It is answered without authentication, so it says nothing of the plant."""
+        """Tell the capabilities of this server. No log-in is needed, so it says nothing of the plant."""
         return success({"specVersion": SPEC_VERSION, "serverName": "cnctwin", "capabilities": CAPABILITIES})
 
     @router.get("/namespaces")

@@ -1,4 +1,4 @@
-"""What clients send, checked before anything is done with it."""
+"""The requests of clients, checked before anything is done with them."""
 
 from typing import Annotated
 

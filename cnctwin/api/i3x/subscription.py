@@ -62,7 +62,7 @@ class Subscription:
         self.id, self.owner, self.display_name, self.client = subscription_id, owner, display_name, client
         self.monitored: dict[str, Monitored] = {}
         self.machines: Counter[str] = Counter()
-        """How many objects of each machine ("" = the plant) are monitored."""
+        """Return the number of monitored objects of each machine ("" = the plant)."""
         self.used_s = now_s
         self.stream: Stream | None = None
         self._batches: deque[Numbered] = deque()

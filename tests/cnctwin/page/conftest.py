@@ -14,6 +14,19 @@ CHROMIUM = Path("/usr/bin/chromium")
 VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "parts/vmc", "figures", "jobs")
 SIZES = {"tablet": (1024, 768), "wall": (1280, 800), "phone": (390, 844)}
 
+INK = """async (selector) => {
+  const canvas = document.querySelector(selector);
+  const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+  const seen = new Set();
+  for (let i = 0; i < data.length; i += 4) seen.add(data[i] + ',' + data[i + 1] + ',' + data[i + 2]);
+  return seen.size;
+}"""
+
+
+def expect_drawn(page: Page, selector: str) -> None:
+    """More than a frame is drawn on it, at once or soon."""
+    page.wait_for_function(f"async (selector) => await ({INK})(selector) > 4", arg=selector)
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
