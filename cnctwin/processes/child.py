@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
@@ -30,6 +30,7 @@ class Child:
     name: str
     command: Sequence[str]
     log: Path
+    clock: Callable[[], float] = time.monotonic
     restarts: int = 0
     _process: subprocess.Popen[bytes] | None = None
     _log_file: IO[bytes] | None = None
@@ -39,7 +40,7 @@ class Child:
         """Start the process; its output goes into the log file."""
         if self._log_file is None:
             self._log_file = self.log.open("ab")
-        self._started_s = time.monotonic()
+        self._started_s = self.clock()
         self._process = subprocess.Popen(
             self.command,
             stdin=subprocess.DEVNULL,
@@ -61,7 +62,7 @@ class Child:
 
     def watch(self) -> bool:
         """Start the process again if it has died; True where that was needed."""
-        if self.running or time.monotonic() - self._started_s < RESTART_S_MIN:
+        if self.running or self.clock() - self._started_s < RESTART_S_MIN:
             return False
         code = None if self._process is None else self._process.returncode
         _log.warning("%s ended with %s; it is started again", self.name, code)

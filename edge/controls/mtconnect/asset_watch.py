@@ -1,11 +1,12 @@
 """The watch on the tool in the spindle: which asset it is, and whether the agent has to be asked for it.
 
 TOOL_ASSET_ID names the tool, ASSET_CHANGED an asset that has changed, which a control that counts tool life says often: so it is
-asked for again only `ASK_MS_MIN` after the last time, by the stamps of the observations.
+asked for again only `ASK_MS_MIN` after the last time, by the agent's clock. Its heartbeats carry that clock too, so the last
+change before a machine falls silent is read as well.
 
->>> watch = AssetWatch(tool_item="t", changed_item="c")
->>> watch = watch.after("t", "42.1", 1_000, 7)
->>> watch.is_wanted, watch.asked().after("c", "42.1", 2_000, 8).is_wanted, watch.asked().after("c", "42.1", 12_000, 9).is_wanted
+>>> watch = AssetWatch(tool_item="t", changed_item="c").after("t", "42.1", 1_000, 7).due(5_000)
+>>> changed = watch.asked().after("c", "42.1", 2_000, 8)
+>>> watch.is_wanted, changed.due(6_000).is_wanted, changed.due(10_000).is_wanted
 (True, False, True)
 """
 
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 from edge.controls.mtconnect.model import DeviceModel
 from edge.errors import ConfigError
 
-ASK_MS_MIN = 10_000
+ASK_MS_MIN = 5_000
 NOTHING = ("", "UNAVAILABLE")
 
 
@@ -22,7 +23,8 @@ NOTHING = ("", "UNAVAILABLE")
 class AssetWatch:
     """`asset_id`: the tool in the spindle, "" where there is none or none is known; `at_ms`, `sequence`: what it rests on.
 
-    is_wanted: the agent is to be asked now; is_stale: it is to be asked when `ASK_MS_MIN` have passed since `asked_ms`
+    is_wanted: the agent is to be asked now; is_stale: it is to be asked when `ASK_MS_MIN` have passed since `asked_ms`, which the
+    agent's clock showed
     """
 
     tool_item: str = ""
@@ -38,19 +40,21 @@ class AssetWatch:
         """Return the watch after one more observation of the device."""
         if not self.tool_item:
             return self
-        watch = self
         if item == self.tool_item:
             asset_id = "" if value in NOTHING else value
-            watch = replace(self, asset_id=asset_id, is_wanted=bool(asset_id), is_stale=False, at_ms=time_ms, sequence=sequence)
-        elif item == self.changed_item and value == self.asset_id and value:
-            watch = replace(self, is_stale=True, at_ms=time_ms, sequence=sequence)
-        if watch.is_stale and time_ms - watch.asked_ms >= ASK_MS_MIN:
-            return replace(watch, is_wanted=True)
-        return watch
+            return replace(self, asset_id=asset_id, is_wanted=bool(asset_id), is_stale=False, at_ms=time_ms, sequence=sequence)
+        if item == self.changed_item and value == self.asset_id and value:
+            return replace(self, is_stale=True, at_ms=time_ms, sequence=sequence)
+        return self
+
+    def due(self, now_ms: int) -> "AssetWatch":
+        """Return the watch when the agent's clock shows `now_ms`: wanted where it is time to ask, or the clock was set back."""
+        has_waited = not 0 <= now_ms - self.asked_ms < ASK_MS_MIN
+        return replace(self, is_wanted=True, asked_ms=now_ms) if self.is_wanted or (self.is_stale and has_waited) else self
 
     def asked(self) -> "AssetWatch":
         """Return the watch when the agent has answered, whatever it was."""
-        return replace(self, is_wanted=False, is_stale=False, asked_ms=self.at_ms)
+        return replace(self, is_wanted=False, is_stale=False)
 
 
 def watch_of(device: DeviceModel, tool_asset: str) -> AssetWatch:

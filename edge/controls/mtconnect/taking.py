@@ -53,6 +53,8 @@ def take(
         before, asset = asset, asset.after(observation.data_item_id, observation.value, time_ms, sequence)
         if before.asset_id != asset.asset_id or (observation.data_item_id == asset.tool_item and not asset.asset_id):
             taken += _no_tool(cursor, asset, observation, is_baseline)
+    if next_sequence >= cursor.next_sequence:  # an older document shows an older clock
+        asset = asset.due(newest or asset.asked_ms if document.header.created_ms is None else document.header.created_ms)
     if asset.is_wanted and newest is not None:
         asset = replace(asset, at_ms=max(asset.at_ms, newest))  # what is asked for now is as of now
     phase = Phase.ASSET if asset.is_wanted and cursor.phase is Phase.SAMPLE else cursor.phase

@@ -36,13 +36,16 @@ def test_one_that_dies_is_started_again_and_counted(tmp_path: Path, monkeypatch:
 
 
 def test_one_that_dies_at_once_is_not_started_in_a_hurry(tmp_path: Path) -> None:
-    child = python(tmp_path, "raise SystemExit(3)")
+    now_s = 1000.0
+    child = Child("part", [sys.executable, "-c", "raise SystemExit(3)"], tmp_path / "part.log", clock=lambda: now_s)
     child.start()
-    until(lambda: not child.running, "the process to end", child_module.RESTART_S_MIN)
-    restarted_at_once = child.watch()
-    until(child.watch, "it to be started again", 5.0)
+    until(lambda: not child.running, "the process to end")
+    restarted = []
+    for waited in (0.0, 0.9, 1.1):
+        now_s = 1000.0 + waited * child_module.RESTART_S_MIN
+        restarted.append(child.watch())
     child.stop()
-    assert not restarted_at_once
+    assert restarted == [False, False, True]
     assert child.restarts == 1
 
 

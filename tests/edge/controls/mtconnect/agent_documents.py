@@ -73,6 +73,7 @@ def streams(
     conditions: Iterable[str] = (),
     device: tuple[str, str] = ("VMC", "vmc-1"),
     buffer_size: int = 128,
+    created: str = "2026-01-01T00:00:00Z",
 ) -> bytes:
     """An answer to /current or /sample."""
     body = ""
@@ -83,7 +84,7 @@ def streams(
         )
     return (
         f'<?xml version="1.0" encoding="UTF-8"?><MTConnectStreams xmlns="urn:mtconnect.org:MTConnectStreams:{version}">'
-        f'<Header creationTime="2026-01-01T00:00:00Z" instanceId="{instance}" bufferSize="{buffer_size}" firstSequence="{first}" '
+        f'<Header creationTime="{created}" instanceId="{instance}" bufferSize="{buffer_size}" firstSequence="{first}" '
         f'lastSequence="{next_sequence - 1}" nextSequence="{next_sequence}"/><Streams>{body}</Streams></MTConnectStreams>'
     ).encode()
 

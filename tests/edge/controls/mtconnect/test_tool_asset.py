@@ -96,14 +96,32 @@ def test_the_agent_is_asked_for_the_tool_and_sampling_goes_on_where_it_was() -> 
     assert fed(asset("7.1"), cursor=cursor)[1].samples == ()  # nobody waits for it
 
 
-def test_an_asset_that_changes_often_is_asked_for_every_ten_seconds_at_most() -> None:
+def test_an_asset_that_changes_often_is_asked_for_every_five_seconds_at_most() -> None:
     cursor, _ = fed(asset("7.1"), cursor=loaded())
-    for second, phase in ((6, Phase.SAMPLE), (9, Phase.SAMPLE), (16, Phase.ASSET)):
-        changed = value("ac", 10 + second, "7.1", time=f"2026-01-01T00:00:{second:02d}Z")
-        cursor, _ = fed(streams(11 + second, [changed]), cursor=cursor)
+    for second, phase in ((1, Phase.SAMPLE), (4, Phase.SAMPLE), (5, Phase.ASSET)):
+        changed, created = value("ac", 10 + second, "7.1"), f"2026-01-01T00:00:{second:02d}Z"
+        cursor, _ = fed(streams(11 + second, [changed], created=created), cursor=cursor)
         assert cursor.phase is phase
-    other, _ = fed(streams(60, [value("ac", 50, "8.1", time="2026-01-01T01:00:00Z")]), cursor=fed(asset("7.1"), cursor=cursor)[0])
+    later = streams(60, [value("ac", 50, "8.1")], created="2026-01-01T01:00:00Z")
+    other, _ = fed(later, cursor=fed(asset("7.1"), cursor=cursor)[0])
     assert other.phase is Phase.SAMPLE  # the asset of a tool in the magazine
+
+
+def test_the_last_change_before_a_machine_falls_silent_is_read_with_a_heartbeat() -> None:
+    cursor, _ = fed(asset("7.1"), cursor=loaded())
+    cursor, _ = fed(streams(12, [value("ac", 11, "7.1")], created="2026-01-01T00:00:02Z"), cursor=cursor)
+    assert cursor.phase is Phase.SAMPLE
+    cursor, _ = fed(streams(12, created="2026-01-01T00:00:06Z"), cursor=cursor)
+    assert next_request(CONFIG, cursor).path == "/asset/7.1"
+    cursor, frame = fed(asset("7.1", "13"), cursor=cursor)
+    assert dict(values(frame))["tool_life_used_min"] == 13.0
+    assert fed(streams(12, created="2026-01-01T00:00:30Z"), cursor=cursor)[0].phase is Phase.SAMPLE
+
+
+def test_a_clock_of_the_agent_that_is_set_back_does_not_hold_a_change_back() -> None:
+    cursor, _ = fed(asset("7.1"), cursor=loaded())
+    cursor, _ = fed(streams(12, [value("ac", 11, "7.1")], created="2025-12-31T23:00:00Z"), cursor=cursor)
+    assert cursor.phase is Phase.ASSET
 
 
 @pytest.mark.parametrize(("told", "why"), [("", "no tool in the spindle"), ("UNAVAILABLE", "unavailable")])
