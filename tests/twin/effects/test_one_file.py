@@ -36,6 +36,8 @@ def imported(node: ast.AST) -> Iterator[str]:
 
 def names_in(text: str) -> set[str]:
     """Effects that a source imports, or names in a literal: alone, as `effect__parameter`, or with its _ in a sentence."""
+    if not any(name in text for name in catalogue()):
+        return set()
     nodes = list(ast.walk(ast.parse(text)))
     files = {name.split(".")[2] for node in nodes for name in imported(node) if name.startswith("twin.effects.")}
     bare = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
