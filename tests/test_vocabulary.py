@@ -3,7 +3,7 @@
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -33,17 +33,15 @@ NO_TOPICS = {("cnctwin/models/mlflow_export.py", "cnctwin/")}  # the name of an 
 PREFIXES = {"TWIN_PREFIX": twin_signals.TWIN_PREFIX, "RULE_PREFIX": twin_signals.RULE_PREFIX}
 
 
-def texts(path: Path) -> Iterator[str]:
-    """The string literals of a file, prefixes of the vocabulary put in; docstrings are prose."""
-    tree = ast.parse(path.read_text())
-    prose = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    formatted = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
-    parts = {part for node in formatted for part in node.values}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in prose and node not in parts:
-            yield node.value
-    for one in formatted:
-        yield "".join(map(part_text, one.values))
+@cache
+def texts(path: Path) -> frozenset[str]:
+    """Return the string literals of a file, prefixes of the vocabulary put in; docstrings are prose."""
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    formatted = [node for node in nodes if isinstance(node, ast.JoinedStr)]
+    no_text = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    no_text |= {id(part) for node in formatted for part in node.values}
+    plain = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in no_text}
+    return frozenset(plain | {"".join(map(part_text, one.values)) for one in formatted})
 
 
 def part_text(part: ast.expr) -> str:

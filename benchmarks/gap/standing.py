@@ -192,11 +192,11 @@ def growths(folded: Folded) -> list[tuple[float, str]]:
     return found
 
 
-def healthy_quarter(seed: int, weeks: float) -> list[tuple[float, str]]:
-    """Return the growths of a healthy machine: all of them false."""
-    folded = watched(told())
+def healthy_quarter(seed: int, weeks: float, before: tuple[Folded, float | None]) -> list[tuple[float, str]]:
+    """Return the growths of a healthy machine that goes on as it was `before`: all of them false."""
+    folded, temp_c = before[0].copied(), before[1]
     until_s = MONDAY_S + (HEALTHY_DAYS + 7.0 * weeks) * DAY_S
-    for day in production_days([(until_s, Production(machine_as_built(), seed))], MONDAY_S):
+    for day in production_days([(until_s, Production(machine_as_built(), seed))], hour_of(seed), temp_c):
         folded.feed(day)
     judged = [key for key, cell in folded.gap.state.cells.items() if cell.is_judged]
     assert len(judged) >= 8, f"hardly anything was judged: {judged}"
@@ -268,7 +268,7 @@ def main() -> None:
 def _healthy(first: int, machines: int, weeks: float) -> None:
     total = 0
     for seed in range(first, first + machines):
-        found = healthy_quarter(seed, weeks)
+        found = healthy_quarter(seed, weeks, before_effect(seed))
         total += len(found)
         for at_s, why in found:
             print(f"machine {seed}: a false growth after {(at_s - MONDAY_S) / DAY_S - HEALTHY_DAYS:.1f} days: {why}", flush=True)

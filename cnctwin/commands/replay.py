@@ -9,11 +9,7 @@ import typer
 from rich.console import Console
 
 from cnctwin.commands.options import AsJson, StorePlace
-from cnctwin.memory.replay import replay
-from cnctwin.memory.replay.report import shown
-from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.terminal.moment import moment_ms
-from processors.config import read_tables
 
 
 def replay_history(
@@ -31,6 +27,11 @@ def replay_history(
     as_json: AsJson = False,
 ) -> None:
     """Run the processors again over history and compare with what they published then. Exit code 1: it differs."""
+    from cnctwin.memory.replay import replay
+    from cnctwin.memory.replay.report import shown
+    from cnctwin.memory.store.opening import default_place, open_store
+    from processors.config import read_tables
+
     from_ms, to_ms = moment_ms(begin, "--from"), moment_ms(end, "--to")
     tables = {} if config is None else read_tables(config)
     names = None if processors is None else [name.strip() for name in processors.split(",") if name.strip()]

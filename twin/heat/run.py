@@ -98,11 +98,13 @@ def held(values: ArrayLike, samples: int, name: str) -> Array:
     if array.shape not in ((), (samples,)):
         raise TwinError(f"{name} has the shape {array.shape}; it has to be one value, or one for each of {samples} samples")
     array = np.broadcast_to(array, (samples,))
-    known = np.flatnonzero(np.isfinite(array))
-    if samples and not known.size:
+    known = np.isfinite(array)
+    if known.all():
+        return np.ascontiguousarray(array)
+    if not known.any():
         raise TwinError(f"{name} has no sample in the whole run")
-    last = np.searchsorted(known, np.arange(samples), side="right") - 1
-    return np.ascontiguousarray(array[known[np.maximum(last, 0)]]) if samples else array.copy()
+    last = np.maximum.accumulate(np.where(known, np.arange(samples), int(np.argmax(known))))
+    return np.asarray(array[last])
 
 
 def _held_inputs(warming: Warming) -> tuple[Array, list[Array]]:

@@ -13,11 +13,8 @@ from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.figures.comma_separated import to_csv
 from cnctwin.figures.documents import read_records
-from cnctwin.figures.folding import folded
 from cnctwin.figures.table import Asked, By, table
-from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.terminal.moment import moment_ms, moment_text
-from processors.config import read_tables
 
 NAME = "production"
 
@@ -39,6 +36,9 @@ def figures(
     as_json: AsJson = False,
 ) -> None:
     """OEE, stops by reason, parts and energy, folded out of the store as the processor `production` does live."""
+    from cnctwin.figures.folding import folded
+    from cnctwin.memory.store.opening import default_place, open_store
+
     if (machine is None) is not every:
         raise UsageError("name one machine with --machine, or all of them with --all")
     from_ms = moment_ms(begin, "--from")
@@ -71,5 +71,7 @@ def figures(
 
 def _settings(config: Path | None, calendar: Path | None) -> dict[str, Any]:
     """Return the table of `production`, with the paths in it as they stand."""
+    from processors.config import read_tables
+
     settings = {} if config is None else dict(read_tables(config).get(NAME, {}))
     return settings if calendar is None else settings | {"calendar": str(calendar)}

@@ -13,7 +13,7 @@ from jinja2 import Template, TemplateError, Undefined, UndefinedError, meta
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from processors.alerts.lag import PLANT
-from processors.alerts.state import Alert, Phase, Severity
+from processors.alerts.state import ALERTS_MAX, Alert, Phase, Severity
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
 from twin.vocabulary.twin_signals import RULE_PREFIX, RULE_VIBRATION, TWIN_PREFIX
 
@@ -73,6 +73,7 @@ class Wording:
         environment.filters["capitalized"] = lambda text: f"{text[:1].upper()}{text[1:]}"
         environment.filters["listed"] = lambda parts: ", ".join(str(part) for part in parts if part)
         self._templates = {text: _compiled(environment, where, text) for where, text in _templates_of(words)}
+        self._rendered_of: dict[str, tuple[Alert, str, str]] = {}  # by fingerprint
 
     def tried(self) -> "Wording":
         """Return it, once each template names only what there is, and title and text could be filled. Raises ValueError."""
@@ -117,11 +118,11 @@ class Wording:
 
     def summary(self, alert: Alert) -> str:
         """Return an alert in one line that stays the same while the alert lasts."""
-        return self._what(alert, self._facts(alert, {}))
+        return self._said(alert)[0]
 
     def details(self, alert: Alert) -> str:
         """Return what the machine was doing, and why a score alarms."""
-        return self._details(alert, self._facts(alert, {}))
+        return self._said(alert)[1]
 
     def advice(self, alert: Alert) -> str:
         """Return what to do first; "" where nothing is known of it."""
@@ -152,6 +153,16 @@ class Wording:
             "advice": self._texts(alert).advice,
             "link": self.link(alert),
         }
+
+    def _said(self, alert: Alert) -> tuple[str, str]:
+        """Return summary and details, rendered once for all the beats at which an alert is the same value."""
+        known = self._rendered_of.get(alert.fingerprint)
+        if known is None or known[0] is not alert:
+            if len(self._rendered_of) >= ALERTS_MAX:
+                self._rendered_of.clear()
+            facts = self._facts(alert, {})
+            known = self._rendered_of[alert.fingerprint] = (alert, self._what(alert, facts), self._details(alert, facts))
+        return known[1:]
 
     def _facts(self, alert: Alert, more: Mapping[str, str]) -> dict[str, Any]:
         """Return what templates may say of an alert; `for_lasting` is empty where nothing is known of its duration."""

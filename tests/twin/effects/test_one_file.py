@@ -36,10 +36,12 @@ def imported(node: ast.AST) -> Iterator[str]:
 
 def names_in(text: str) -> set[str]:
     """Effects that a source imports, or names in a literal: alone, as `effect__parameter`, or with its _ in a sentence."""
-    tree = ast.parse(text)
-    files = {name.split(".")[2] for node in ast.walk(tree) for name in imported(node) if name.startswith("twin.effects.")}
-    bare = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    constants = (node for node in ast.walk(tree) if isinstance(node, ast.Constant) and id(node) not in bare)
+    if not any(name in text for name in catalogue()):
+        return set()
+    nodes = list(ast.walk(ast.parse(text)))
+    files = {name.split(".")[2] for node in nodes for name in imported(node) if name.startswith("twin.effects.")}
+    bare = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    constants = (node for node in nodes if isinstance(node, ast.Constant) and id(node) not in bare)
     literals = {node.value for node in constants if isinstance(node.value, str)}
     words = {word for literal in literals for word in WORD.findall(literal) if "_" in word}
     return (files | words | {literal.partition("__")[0] for literal in literals}) & set(catalogue())

@@ -7,7 +7,9 @@ Friction, on the link or for a part on the motor, is larger in + than in −. It
 tick every millisecond.
 """
 
+import math
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -80,8 +82,8 @@ def _sliding(velocity: float, push: float, part: float, asymmetry: float) -> flo
     """Friction with its sign; at rest, whatever holds against the push."""
     if velocity == 0.0 and abs(push) <= 250.0 * part:
         return push
-    direction = np.sign(velocity) if velocity != 0.0 else np.sign(push)
-    return float(direction * part * (240.0 + 1.5 * abs(velocity)) * (1.0 + asymmetry * direction))
+    direction = math.copysign(1.0, velocity if velocity != 0.0 else push)
+    return direction * part * (240.0 + 1.5 * abs(velocity)) * (1.0 + asymmetry * direction)
 
 
 def _moved(velocity: float, push: float, friction: float, mass_kg: float) -> float:
@@ -90,28 +92,34 @@ def _moved(velocity: float, push: float, friction: float, mass_kg: float) -> flo
     return 0.0 if velocity * new < 0.0 else new
 
 
-def robot_log(
-    seed: int, *, noise_seed: int, seconds: float = 16.0, with_reference: bool = True, joint: Joint = Joint()
-) -> dict[str, Floats]:
-    """A recording of the axis."""
+@cache
+def moved(seed: int, seconds: float, joint: Joint) -> tuple[Floats, Floats]:
+    """The axis without noise, (steps, 3): motor, link, command; and its reference, (steps,). It is the same in each recording."""
     r = reference(seed, seconds)
     rv = np.gradient(r, STEP_S)
-    ra = np.gradient(rv, STEP_S)
     x1 = x2 = v1 = v2 = u = 0.0
-    rows = np.zeros((len(r), 3))
-    for i in range(len(r)):
-        apart = x1 - x2 - joint.gear_mm * np.sin(2.0 * np.pi * x1 / GEAR_TURN_MM)
-        apart -= np.clip(apart, -0.5 * joint.play_mm, 0.5 * joint.play_mm)
+    rows = []
+    for i, (at, along, ahead) in enumerate(zip(r.tolist(), rv.tolist(), np.gradient(rv, STEP_S).tolist(), strict=True)):
+        apart = x1 - x2 - joint.gear_mm * math.sin(2.0 * math.pi * x1 / GEAR_TURN_MM)
+        apart -= min(max(apart, -0.5 * joint.play_mm), 0.5 * joint.play_mm)
         spring = STIFFNESS_N_PER_MM * apart + DAMPING_N_S_PER_MM * (v1 - v2)
         if i % 5 == 0:  # the loops of the robot tick every millisecond
-            u = (900.0 * (r[i] - x1) + 14.0 * (rv[i] - v1) - 0.2 * spring + 0.2 * ra[i]) / NEWTON_PER_A
-        rows[i] = x1, x2, u
-        push1, push2 = NEWTON_PER_A * u - spring, spring - joint.arm_n * np.sin(2.0 * np.pi * x2 / ARM_TURN_MM)
+            u = (900.0 * (at - x1) + 14.0 * (along - v1) - 0.2 * spring + 0.2 * ahead) / NEWTON_PER_A
+        rows.append((x1, x2, u))
+        push1, push2 = NEWTON_PER_A * u - spring, spring - joint.arm_n * math.sin(2.0 * math.pi * x2 / ARM_TURN_MM)
         friction1 = _sliding(v1, push1, joint.on_motor, joint.asymmetry)
         friction2 = _sliding(v2, push2, 1.0 - joint.on_motor, joint.asymmetry)
         v1 = _moved(v1, push1, friction1, joint.motor_kg)
         v2 = _moved(v2, push2, friction2, MOVING_KG - joint.motor_kg)
         x1, x2 = x1 + STEP_S * v1, x2 + STEP_S * v2
+    return np.array(rows), r
+
+
+def robot_log(
+    seed: int, *, noise_seed: int, seconds: float = 16.0, with_reference: bool = True, joint: Joint = Joint()
+) -> dict[str, Floats]:
+    """A recording of the axis."""
+    rows, r = moved(seed, seconds, joint)
     draw = np.random.default_rng(noise_seed)
     kept = rows[::EVERY] + draw.standard_normal((len(rows[::EVERY]), 3)) * [0.0005, 0.0005, 0.02]
     log = {

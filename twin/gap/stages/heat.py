@@ -161,23 +161,33 @@ class HeatStage:
 
     def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
         """Return what `predict` returns, as it is between the steps of the reading."""
-        return np.concatenate(self._read(model, theta, self.runs[run]), axis=1)
+        return np.concatenate(self._read(model, theta, run), axis=1)
 
     def step_of(self, run: int) -> float:
         """Return the step in which the temperature was read."""
-        return coarse_step(self.runs[run].log[SIGNAL], self.observed[run].floor)
+        return self._steps[run]
+
+    @cached_property
+    def _steps(self) -> tuple[float, ...]:
+        return tuple(coarse_step(r.log[SIGNAL], o.floor) for r, o in zip(self.runs, self.observed, strict=True))
+
+    @cached_property
+    def _log_steps(self) -> tuple[float, ...]:
+        """The steps by the floors of the samples, not by those of what is compared."""
+        return tuple(coarse_step(r.log[SIGNAL], self.floors.of(r.log, SIGNAL)) for r in self.runs)
 
     def shown(self, model: Model, theta: Floats, run: int) -> Floats:
         """Return what the twin shows at the rows of a run, (rows,), NaN where there is none that is compared."""
         data = self.runs[run]
         column, recorded = np.full(len(data.log), np.nan), data.log[SIGNAL]
-        for part, read in zip(data.parts, self._read(model, theta, data), strict=True):
+        for part, read in zip(data.parts, self._read(model, theta, run), strict=True):
             column[part.rows] = np.interp(data.log.t_s[part.rows], part.at_s, read[0])
-        return as_read(column, recorded, coarse_step(recorded, self.observed[run].floor))
+        return as_read(column, recorded, self.step_of(run))
 
-    def _read(self, model: Model, theta: Floats, data: HeatRun) -> list[Floats]:
+    def _read(self, model: Model, theta: Floats, run: int) -> list[Floats]:
         """The readings of each part of a run, (lanes, n)."""
         assert self.machine.thermal is not None
+        data = self.runs[run]
         values, factors = model.values(theta), model.factors(theta)
         constants: dict[str, ArrayLike] = {}
         for name, value in thermal_constants(self.machine.thermal).items():
@@ -190,7 +200,7 @@ class HeatStage:
         learned = reading_of_terms(model, theta, SIGNAL, lambda: arguments)
         standing = reading_series(self.terms, SIGNAL, arguments)
         learned = learned if standing is None else learned + standing
-        step = coarse_step(data.log[SIGNAL], self.floors.of(data.log, SIGNAL))
+        step = self._log_steps[run]
         found, place = [], 0
         for part in data.parts:
             here = slice(place, place + len(part.at_s))

@@ -82,7 +82,7 @@ def test_the_clock_of_the_machine_goes_with_its_speed(machine: SimulatedMachine)
     until(lambda: span_s() > 100.0, "a hundred seconds of the machine")
     begun_s, before_s = time.monotonic(), span_s()
     until(lambda: span_s() > before_s + 200.0, "two hundred more")
-    assert 0.5 < time.monotonic() - begun_s < 20.0  # 2 s, were there nothing else on this computer
+    assert 0.5 < time.monotonic() - begun_s < 100.0  # 2 s on an idle computer; 200 s at the speed of a real machine
 
 
 def test_stamps_never_go_back(machine: SimulatedMachine) -> None:
