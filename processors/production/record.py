@@ -1,7 +1,7 @@
 """The records that the fold tells, as JSON: one of each shift when it is over, and one of each part when it has ended.
 
-Times are ms since 1970; a shift names the time zone of its calendar. A record that comes again with the same `id` replaces the one
-before: a part whose quality is told later.
+Times are ms since 1970; a shift names the time zone of its calendar. A record that comes again with the same `id` replaces the
+one before: a part whose quality is told later.
 """
 
 import hashlib

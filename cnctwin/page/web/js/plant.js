@@ -39,7 +39,7 @@ export class Machine {
 
   /** Now, by the clock that stamps this machine's values. A machine of another clock (a time lapse) is as old as its newest value. */
   now() {
-    return this.otherClock ? this.lastT + (performance.now() - this.lastHeard) : serverNow();
+    return this.otherClock ? Math.round(this.lastT + (performance.now() - this.lastHeard)) : serverNow();
   }
 
   /** The newest moment of which anything is known: values hold until then, and nothing does beyond it. A machine that has lived

@@ -27,7 +27,7 @@ const pct = (value) => (Number.isFinite(value) ? `${fixed(100 * value, 1)} %` : 
 const kwh = (value) => (Number.isFinite(value) ? `${number(value)} kWh` : "–");
 const spent = (seconds) => (Number.isFinite(seconds) ? duration(1000 * Math.round(seconds)) : "–");
 const named = (row) => (row.shift === undefined ? row.machine : `${row.machine}, ${row.shift ?? "no shift"}`);
-const when = (row, zone) => moment(row.begin, { seconds: false, zone }) + (row.over === false ? ", runs" : "");
+const when = (row, zone) => moment(row.begin, { seconds: false, zone }) + (row.over === false ? ", so far" : "");
 
 /** The reasons why figures are missing, each once, with the rows that it is of where it is not of all. */
 function reasons(rows) {

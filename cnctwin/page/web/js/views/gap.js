@@ -323,7 +323,7 @@ export function open(app, { machine: named }) {
     machine: name,
     stream: `stream?machine=${part(name)}`,
     keys: [
-      [["o"], "open the report", () => body.querySelector("a.report")?.click()],
+      [["v"], "open the report", () => body.querySelector("a.report")?.click()],
       [["l"], "reload", load],
       [["d"], "diagnose", () => loop.press("diagnose")],
       [["P"], "promote the challenger", () => loop.press("promote")],

@@ -132,7 +132,7 @@ export function open(app, { machine: named, search }) {
     el(
       "section",
       {},
-      el("h2", {}, "The same again?"),
+      el("h2", {}, "Recompute"),
       el(
         "p",
         { class: "note" },

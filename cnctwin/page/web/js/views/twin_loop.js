@@ -148,7 +148,7 @@ export function twinLoop(app, name, changed = () => {}) {
   /** The figures that move: the time that a step takes, and the standing gap as the stream tells it. */
   function write() {
     if (loop === null) return;
-    setText(since, Number.isFinite(loop.since) ? `for ${age(serverNow() - loop.since)}` : "");
+    setText(since, loop.since > 0 ? `for ${age(serverNow() - loop.since)}` : "");
     const standing = {};
     for (const [signal, one] of Object.entries(loop.standing ?? {})) {
       standing[signal] = {
@@ -220,6 +220,6 @@ function closed(one) {
     "p",
     { class: "closed" },
     el("strong", {}, inWords(one.text)),
-    Number.isFinite(one.since) ? el("span", { class: "quiet" }, ` since ${moment(one.since)}`) : null,
+    one.since > 0 ? el("span", { class: "quiet" }, ` since ${moment(one.since)}`) : null,
   );
 }
