@@ -64,6 +64,7 @@ class FleetItem(Answer):
     growing: Plain = None
     residual_k: Plain = None
     gap: float | None = Field(None, description="largest standing gap of any signal, rms over its floor")
+    gap_reason: str | None = Field(None, description="why there is no gap; null where there is one")
     last_t: int | None = None
 
 
@@ -136,6 +137,7 @@ class Figures(Answer):
     from_: T = Field(alias="from")
     to: T
     by: Literal["machine", "shift", "part", "program"]
+    time_zone: str = Field("UTC", description="of the shift calendar; times here are ms since 1970", examples=["Europe/Berlin"])
     left_out: int = Field(0, description="rows that were beyond the limit: the oldest")
     refused: int = Field(0, description="records that had not the shape of one")
     note: str = Field("", description="why there is no row; empty where there is one")

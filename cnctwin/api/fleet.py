@@ -1,6 +1,7 @@
 """A machine in short: what an overview of fifty of them shows."""
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from cnctwin.api.value_object import Plain, plain
@@ -23,6 +24,7 @@ SHOWN = {
     "residual_k": twin_signals.SPINDLE_TEMP_RESIDUAL_K,
 }
 _KEYS = frozenset(SHOWN.values())
+NO_GAP = "no gap is computed for this machine: the processor gap, which does it, does not run"
 
 
 class SignalReading(Protocol):
@@ -42,13 +44,22 @@ def fleet_item(machine: str, online: bool, signals: Mapping[str, SignalReading])
     for title, name in SHOWN.items():
         told = signals.get(name)
         item[title] = None if told is None else _known(told.reading)
-    gaps = [
-        value for name, told in signals.items() if twin_signals.is_gap(name) and isinstance(value := _known(told.reading), float)
-    ]
+    standing = [told.reading for name, told in signals.items() if twin_signals.is_gap(name)]
+    gaps = [value for reading in standing if isinstance(value := _known(reading), float)]
     item["gap"] = max(gaps, default=None)
+    item["gap_reason"] = None if gaps else _why_no_gap(standing)
     measured = (told.reading.timestamp_ms for name, told in signals.items() if not name.startswith(twin_signals.TWIN_PREFIX))
     item["last_t"] = max(measured, default=None)
     return item
+
+
+def _why_no_gap(standing: Sequence[Reading]) -> str:
+    """Return the reason that most signals of the machine give; one that the machine does not offer has no say."""
+    if not standing:
+        return NO_GAP
+    reasons = Counter(reading.reason or "not known yet" for reading in standing)
+    said = [one for one in reasons.most_common() if not one[0].endswith("is not offered")] or reasons.most_common()
+    return said[0][0]
 
 
 def _known(reading: Reading) -> Plain:

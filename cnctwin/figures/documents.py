@@ -3,13 +3,27 @@
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+
+from processors.wall_clock import zone
 
 TEXT_MAX = 200
 Text = Annotated[str, Field(max_length=TEXT_MAX)]
 Seconds = Annotated[float, Field(ge=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0, le=10**9)]
 Moment = Annotated[int, Field(ge=0, le=250_000_000_000_000)]
+
+
+def _zone_or_none(name: object) -> object:
+    """Return the name of a time zone, or None where there is none of this name: times are then shown in UTC."""
+    try:
+        zone(str(name))
+    except (ValueError, LookupError, OSError):
+        return None
+    return name
+
+
+KnownZone = Annotated[Text | None, BeforeValidator(_zone_or_none)]
 
 
 class _Record(BaseModel):
@@ -33,6 +47,7 @@ class ShiftTold(_Record):
     shift: Text | None
     begin: Moment
     end: Moment
+    time_zone: KnownZone = None
     over: bool
     calendar: bool
     planned_s: Seconds

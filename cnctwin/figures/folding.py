@@ -87,7 +87,8 @@ class _Folding:
         tally = None if lane is None else settled(lane.state).tally
         if tally is not None and not tally.is_empty:
             share = self._configuration.default.known_share_min
-            self._told.append(shift_record(self._machine, tally, share, is_over=False))
+            zone = Given(self._configuration).time_zone
+            self._told.append(shift_record(self._machine, tally, share, zone, is_over=False))
         return self._told
 
     def _in_order(self) -> Iterator[tuple[int, HostEvent, bool]]:

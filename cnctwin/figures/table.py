@@ -40,6 +40,12 @@ class Asked(NamedTuple):
 Row = dict[str, Any]
 
 
+def time_zone_of(shifts: Iterable[ShiftTold]) -> str:
+    """Return the time zone of the calendar that these shifts name; UTC where they name none, or several."""
+    named = {one.time_zone for one in shifts if one.time_zone is not None}
+    return named.pop() if len(named) == 1 else "UTC"
+
+
 def table(shifts: Sequence[ShiftTold], parts: Sequence[PartTold], asked: Asked) -> list[Row]:
     """Return the rows."""
     if asked.by in (By.PART, By.PROGRAM):

@@ -3,6 +3,7 @@
 import re
 import time
 from datetime import UTC, datetime
+from zoneinfo import ZoneInfo
 
 from cnctwin.errors import UsageError
 
@@ -45,10 +46,12 @@ def length_ms(text: str, option: str = "--every") -> int:
     return int(match[1]) * (1 if match[2] == "ms" else round(_SECONDS[match[2]] * 1000))
 
 
-def moment_text(at_ms: float) -> str:
-    """Return a moment in UTC as a table shows it.
+def moment_text(at_ms: float, time_zone: str = "UTC") -> str:
+    """Return a moment as a table shows it, by the clock on the wall of a time zone.
 
     >>> moment_text(1_795_327_200_999)
     '2026-11-22 06:00:00'
+    >>> moment_text(1_795_327_200_999, "Europe/Berlin")
+    '2026-11-22 07:00:00'
     """
-    return datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    return datetime.fromtimestamp(at_ms / 1000, ZoneInfo(time_zone)).strftime("%Y-%m-%d %H:%M:%S")

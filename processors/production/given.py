@@ -44,6 +44,11 @@ class Given:
         found: Calendar | None = self.configuration.read[CALENDAR]
         return found
 
+    @property
+    def time_zone(self) -> str:
+        """The zone of the calendar, in which its shifts are written; without one days are counted in UTC."""
+        return "UTC" if self.calendar is None else self.calendar.file.time_zone
+
     def slot(self, machine: str, at_s: float) -> Slot:
         """Return the slot of the calendar, or without one the day in UTC."""
         calendar = self.calendar

@@ -75,7 +75,7 @@ def step(means: Given, state: State, sample: Sample) -> tuple[State, Sequence[Ou
     if is_due or outputs:
         state = replace(settled(state), told_s=sample.at_s)
         if state.tally is not None:
-            outputs += _figures(state.tally, sample.machine, config.known_share_min)
+            outputs += _figures(means, state.tally, sample.machine, config.known_share_min)
     return state, outputs
 
 
@@ -135,7 +135,7 @@ def _joined(means: Given, config: Config, state: State, machine: str, outputs: l
     tally = state.tally
     if tally is None or not tally.is_of(slot):
         if tally is not None and not tally.is_empty:
-            record = shift_record(machine, tally, config.known_share_min, is_over=True)
+            record = shift_record(machine, tally, config.known_share_min, means.time_zone, is_over=True)
             outputs.append(Output(PRODUCTION, record, at_s=min(tally.end_s, state.at_s)))
         tally = _opened(means, machine, slot, state.at_s)
     return replace(state, tally=tally, pending=Pending(slot.until_s, is_planned=slot.is_planned))
@@ -226,7 +226,7 @@ def _part_output(machine: str, part: LastPart) -> Output:
     return Output(PRODUCTION, part_record(machine, told))
 
 
-def _figures(tally: Tally, machine: str, known_share_min: float) -> list[Output]:
+def _figures(means: Given, tally: Tally, machine: str, known_share_min: float) -> list[Output]:
     """Return the figures of the shift so far."""
     found = ratios(sums_of(tally), known_share_min)
     outputs = [
@@ -240,7 +240,7 @@ def _figures(tally: Tally, machine: str, known_share_min: float) -> list[Output]
         outputs.append(Output(ENERGY, round(tally.energy_kwh, 4)))
     else:
         outputs.append(Output.null(ENERGY, NO_POWER))
-    now = shift_record(machine, tally, known_share_min, is_over=False)
+    now = shift_record(machine, tally, known_share_min, means.time_zone, is_over=False)
     return [*outputs, Output(STOPS, json.dumps(json.loads(now)["stops"], ensure_ascii=False)), Output(PRODUCTION_NOW, now)]
 
 

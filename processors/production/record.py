@@ -1,6 +1,7 @@
 """The records that the fold tells, as JSON: one of each shift when it is over, and one of each part when it has ended.
 
-Times are ms since 1970. A record that comes again with the same `id` replaces the one before: a part whose quality is told later.
+Times are ms since 1970; a shift names the time zone of its calendar. A record that comes again with the same `id` replaces the
+one before: a part whose quality is told later.
 """
 
 import hashlib
@@ -24,8 +25,8 @@ def sums_of(tally: Tally) -> Sums:
     )  # fmt: skip
 
 
-def shift_record(machine: str, tally: Tally, known_share_min: float, *, is_over: bool) -> str:
-    """Return the record of a shift."""
+def shift_record(machine: str, tally: Tally, known_share_min: float, time_zone: str, *, is_over: bool) -> str:
+    """Return the record of a shift; time_zone: that of the calendar."""
     found = ratios(sums_of(tally), known_share_min)
     document: dict[str, Any] = {
         "version": VERSION,
@@ -35,6 +36,7 @@ def shift_record(machine: str, tally: Tally, known_share_min: float, *, is_over:
         "shift": tally.shift,
         "begin": _ms(tally.begin_s),
         "end": _ms(tally.end_s),
+        "time_zone": time_zone,
         "over": is_over,
         "calendar": tally.has_calendar,
         "planned_s": _rounded(tally.planned_s),

@@ -13,7 +13,7 @@ from cnctwin.api.samples import samples_of
 from cnctwin.api.sources import Sources
 from cnctwin.figures.comma_separated import to_csv
 from cnctwin.figures.documents import read_records
-from cnctwin.figures.table import Asked, By, table
+from cnctwin.figures.table import Asked, By, table, time_zone_of
 from sparkplug.clock import now_ms
 from twin.vocabulary.twin_signals import PRODUCTION, PRODUCTION_NOW
 
@@ -51,21 +51,21 @@ def figure_routes(sources: Sources) -> APIRouter:
                 "machine-days; give a shorter one, or one machine",
             )
         texts = [text for name in machines for text in await _records(sources, name, start_ms, end_ms)]
-        rows, refused = await sources.store.work(lambda: _rows(texts, Asked(by, start_ms, end_ms)))
+        rows, refused, time_zone = await sources.store.work(lambda: _rows(texts, Asked(by, start_ms, end_ms)))
         left_out = max(len(rows) - ROWS_MAX, 0)
         rows = rows[left_out:]
         if format == "csv":
             name = f'attachment; filename="figures-{by}.csv"'
             return Response(to_csv(rows, by), media_type="text/csv", headers={"Content-Disposition": name})
-        head = {"from": start_ms, "to": end_ms, "by": str(by), "left_out": left_out, "refused": refused}
+        head = {"from": start_ms, "to": end_ms, "by": str(by), "time_zone": time_zone, "left_out": left_out, "refused": refused}
         return {**head, "note": "" if rows else NOTHING, "rows": rows}
 
     return router
 
 
-def _rows(texts: list[str], asked: Asked) -> tuple[list[dict[str, Any]], int]:
+def _rows(texts: list[str], asked: Asked) -> tuple[list[dict[str, Any]], int, str]:
     shifts, parts, refused = read_records(texts)
-    return table(shifts, parts, asked), refused
+    return table(shifts, parts, asked), refused, time_zone_of(shifts)
 
 
 async def _machines(sources: Sources, machine: str | None) -> list[str]:

@@ -13,7 +13,7 @@ from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.figures.comma_separated import to_csv
 from cnctwin.figures.documents import read_records
-from cnctwin.figures.table import Asked, By, table
+from cnctwin.figures.table import Asked, By, table, time_zone_of
 from cnctwin.terminal.moment import moment_ms, moment_text
 
 NAME = "production"
@@ -56,6 +56,7 @@ def figures(
     finally:
         opened.close()
     shifts, parts, _ = read_records(texts)
+    time_zone = time_zone_of(shifts)
     first_ms = min((one.begin for one in shifts if one.begin <= from_ms < one.end), default=from_ms)
     share = {"known_share_min": settings["known_share_min"]} if "known_share_min" in settings else {}
     rows = table(shifts, parts, Asked(by, first_ms, to_ms, **share))
@@ -64,9 +65,12 @@ def figures(
     elif csv is not None:
         sys.stdout.write(to_csv(rows, by))
     if as_json:
-        sys.stdout.write(json.dumps({"from": from_ms, "to": to_ms, "by": str(by), "rows": rows}, ensure_ascii=False) + "\n")
+        sys.stdout.write(
+            json.dumps({"from": from_ms, "to": to_ms, "by": str(by), "time_zone": time_zone, "rows": rows}, ensure_ascii=False)
+            + "\n"
+        )
     elif csv is None:
-        show(rows, by)
+        show(rows, by, time_zone)
 
 
 def _settings(config: Path | None, calendar: Path | None) -> dict[str, Any]:

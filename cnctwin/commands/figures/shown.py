@@ -30,8 +30,8 @@ _HEADS = {
 _STOPS_SHOWN = 3
 
 
-def show(rows: list[Row], by: By) -> None:
-    """Print the rows as a table, then the longest stops of each, then why figures are missing."""
+def show(rows: list[Row], by: By, time_zone: str) -> None:
+    """Print the rows as a table with times in a zone, then the longest stops of each, then why figures are missing."""
     console = standard_output()
     if not rows:
         console.print("no shift begins, and no part ends, in this stretch")
@@ -41,13 +41,15 @@ def show(rows: list[Row], by: By) -> None:
     for name in names:
         shown.add_column(_HEADS.get(name, name), no_wrap=True)
     for row in rows:
-        shown.add_row(*(_cell(name, row.get(name)) for name in names))
+        shown.add_row(*(_cell(name, row.get(name), time_zone) for name in names))
     console.print(shown)
+    if any(name in ("begin", "end") for name in names) or any(row.get("stops") for row in rows):
+        console.print(f"times in {time_zone}", markup=False)
     reasons: dict[str, None] = {}
     for row in rows:
         stops = list(row.get("stops", {}).items())[:_STOPS_SHOWN]
         if stops:
-            where = " ".join(filter(None, (row["machine"], row.get("shift"), moment_text(row["begin"]))))
+            where = " ".join(filter(None, (row["machine"], row.get("shift"), moment_text(row["begin"], time_zone))))
             console.print(
                 f"{where}: " + "; ".join(f"{reason} {stop['s']:.0f} s ({stop['n']})" for reason, stop in stops), markup=False
             )
@@ -56,11 +58,11 @@ def show(rows: list[Row], by: By) -> None:
         console.print(reason, markup=False)
 
 
-def _cell(name: str, value: Any) -> str:
+def _cell(name: str, value: Any, time_zone: str) -> str:
     if value is None:
         return "–"
     if name in ("begin", "end"):
-        return moment_text(value)[5:16]
+        return moment_text(value, time_zone)[5:16]
     if name in ("availability", "performance", "quality", "oee"):
         return f"{100.0 * value:.1f} %"
     return f"{value:.3f}" if "kwh" in name else f"{value:.0f}" if isinstance(value, float) else str(value)

@@ -58,6 +58,20 @@ def test_a_person_reads_them_with_the_stops_and_the_reasons(asked: list[str]) ->
     assert "[production]" not in done.stdout  # nothing is missing
 
 
+def test_times_are_those_of_the_calendar_and_its_zone_is_named_once(asked: list[str], tmp_path: Path) -> None:
+    berlin = tmp_path / "berlin.toml"
+    calendar = CALENDAR.replace("14:51", "15:51").replace("13:51", "14:51")  # the same hour by another clock
+    berlin.write_text('time_zone = "Europe/Berlin"\n' + calendar, encoding="utf-8")
+    told = [*asked, *_to(7200.0), "--all", "--calendar", str(berlin)]
+    shown = RUNNER.invoke(APP, told).stdout
+    assert shown.count("Europe/Berlin") == 1
+    assert "14:51" in shown
+    assert "13:51" not in shown
+    found = json.loads(RUNNER.invoke(APP, [*told, "--json"]).stdout)
+    assert found["time_zone"] == "Europe/Berlin"
+    assert datetime.fromtimestamp(found["rows"][0]["begin"] / 1000, UTC).strftime("%H:%M") == "13:51"
+
+
 def test_the_csv_is_what_the_table_is(asked: list[str], tmp_path: Path) -> None:
     out = tmp_path / "parts.csv"
     done = RUNNER.invoke(APP, [*asked, *_to(7200.0), "--all", "--by", "part", "--csv", str(out)])

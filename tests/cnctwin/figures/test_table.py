@@ -8,7 +8,7 @@ import pytest
 
 from cnctwin.figures.comma_separated import COLUMNS, to_csv
 from cnctwin.figures.documents import PartTold, ShiftTold
-from cnctwin.figures.table import Asked, By, table
+from cnctwin.figures.table import Asked, By, table, time_zone_of
 
 HOUR_MS = 3_600_000
 
@@ -98,6 +98,21 @@ def test_only_what_begins_or_ends_in_the_stretch_is_in_it() -> None:
     asked = Asked(By.SHIFT, HOUR_MS, 2 * HOUR_MS)
     assert [row["begin"] for row in table([_shift(), _shift(1, "b"), _shift(2, "c")], [], asked)] == [HOUR_MS]
     assert table([], [_part(1), _part(1, 2)], asked._replace(by=By.PART)) == []
+
+
+@pytest.mark.parametrize(
+    ("named", "zone"),
+    [
+        ([], "UTC"),
+        ([None, "Europe/Berlin"], "Europe/Berlin"),
+        (["Europe/Berlin", "America/New_York"], "UTC"),
+        (["Mars/Olympus"], "UTC"),
+        (["../../etc/passwd"], "UTC"),
+        ([17], "UTC"),
+    ],
+)
+def test_the_zone_is_that_of_the_calendar_that_all_shifts_name(named: list[Any], zone: str) -> None:
+    assert time_zone_of([_shift(n, str(n), time_zone=one) for n, one in enumerate(named)]) == zone
 
 
 @pytest.mark.parametrize("by", list(By))

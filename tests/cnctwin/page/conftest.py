@@ -44,9 +44,16 @@ class Visit:
     """A page of a server, and what its console and its network said."""
 
     def __init__(
-        self, browser: Browser, url: str, size: tuple[int, int] = SIZES["tablet"], scheme: str = "light", locale: str = "en-GB"
+        self,
+        browser: Browser,
+        url: str,
+        size: tuple[int, int] = SIZES["tablet"],
+        scheme: str = "light",
+        locale: str = "en-GB",
+        zone: str = "UTC",
     ) -> None:
-        self.context = browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, locale=locale)  # type: ignore[arg-type]
+        viewport = {"width": size[0], "height": size[1]}
+        self.context = browser.new_context(viewport=viewport, color_scheme=scheme, locale=locale, timezone_id=zone)  # type: ignore[arg-type]
         self.context.set_default_timeout(WAIT_MS_MAX)
         self.page: Page = self.context.new_page()
         self.url = url

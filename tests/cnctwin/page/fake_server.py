@@ -37,6 +37,7 @@ class Shop:
         self.numbers = {name: number for number, name in enumerate(machines)}
         self.period_s = period_s
         self.offline_since: dict[str, int] = {}
+        self.ahead_ms: dict[str, int] = {}  # by machine: by how much its stamps run ahead, as those of a time lapse
         self.other: dict[str, dict[str, SignalValue]] = {}
         self.without: dict[str, re.Pattern[str]] = {}  # by machine: the signals that it does not have
         self.answers: dict[str, Callable[[str, dict[str, Any] | None], Answer]] = {}
@@ -52,7 +53,8 @@ class Shop:
         t_ms = min(t_ms, self.offline_since.get(machine, t_ms))
         all_of_it = {**signals(self.numbers[machine], t_ms / 1000.0), **self.other.get(machine, {})}
         without = self.without.get(machine)
-        return {name: one for name, one in all_of_it.items() if without is None or not without.fullmatch(name)}, t_ms
+        told = {name: one for name, one in all_of_it.items() if without is None or not without.fullmatch(name)}
+        return told, t_ms + self.ahead_ms.get(machine, 0)
 
     def fleet(self) -> dict[str, Any]:
         """As the stream begins."""
@@ -74,7 +76,7 @@ class Shop:
 
     def history(self, machine: str, names: list[str], start: int, end: int, every: int) -> dict[str, Any]:
         """Columns, from the same function of time as the stream."""
-        end = min(end, now_ms(), self.offline_since.get(machine, end))
+        end = min(end, now_ms() + self.ahead_ms.get(machine, 0), self.offline_since.get(machine, end))
         times = list(range(start // every * every + every, end, every))
         rows = [self.told(machine, t)[0] for t in times]
         columns = []

@@ -8,11 +8,12 @@ from cnctwin.figures.table import Asked, By, table
 from tests.cnctwin.page.fake_server import Answer, now_ms
 
 HOUR_MS = 3_600_000
+ZONE = "America/New_York"
 HOSTILE = "<img src=x onerror=alert(1)>"
 
 
-def told() -> tuple[list[ShiftTold], list[PartTold]]:
-    began = now_ms() - 10 * HOUR_MS
+def told(began: int | None = None) -> tuple[list[ShiftTold], list[PartTold]]:
+    began = now_ms() - 10 * HOUR_MS if began is None else began
     stops = {
         "feed hold": {"kind": "delay", "s": 1800.0, "n": 4},
         f"alarm: {HOSTILE}": {"kind": "down", "s": 900.0, "n": 1},
@@ -45,10 +46,10 @@ def told() -> tuple[list[ShiftTold], list[PartTold]]:
     return shifts, [PartTold.model_validate(one) for one in parts]
 
 
-def figures(asked: dict[str, str]) -> Answer:
-    shifts, parts = told()
+def figures(asked: dict[str, str], began: int | None = None) -> Answer:
+    shifts, parts = told(began)
     by = By(asked["by"])
     rows = table(shifts, parts, Asked(by, int(asked["from"]), int(asked["to"])))
     wanted = asked.get("machine")
     rows = [json.loads(json.dumps(row)) for row in rows if wanted in (None, row["machine"])]
-    return 200, {"from": int(asked["from"]), "to": int(asked["to"]), "by": by, "note": "", "rows": rows}
+    return 200, {"from": int(asked["from"]), "to": int(asked["to"]), "by": by, "time_zone": ZONE, "note": "", "rows": rows}

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from cnctwin.api.fleet import NO_GAP
+
 Value = float | int | str | bool | None
 PROGRAM = (  # seconds, tool, what it does: rpm, load, feed, block
     (9.0, 1, 6000, 31.0, 1800, "G1 X86.2 F1800"),
@@ -134,4 +136,5 @@ def fleet_item(machine: str, values: Mapping[str, SignalValue], t_ms: int, *, on
     """A machine in short."""
     item: dict[str, Any] = {key: values[name].value if name in values else None for key, name in FLEET.items()}
     gaps = [one.value for name, one in values.items() if name.startswith("twin/gap_") and isinstance(one.value, float)]
-    return {"machine": machine, "online": online, **item, "gap": max(gaps, default=None), "last_t": t_ms}
+    told = {"gap": max(gaps, default=None), "gap_reason": None if gaps else NO_GAP}
+    return {"machine": machine, "online": online, **item, **told, "last_t": t_ms}

@@ -23,7 +23,7 @@ def test_the_machine_says_why_it_alarms_and_what_it_looks_like(visit: Visit, sho
     page = visit.open("#/machine/vmc")
     for text in (
         "Spindle load 18 % above the last 12 parts in lines 210–260 (O1701, tool 5), over some cuts, since ",
-        "Looks like: packed chips (0.91, ",
+        "Looks like: packed chips (likeness 0.91, ",
         "No peer shows it.",
         "Known of what runs: 12 parts.",
         "expected 37.0 ± 3.8 %, measured 43.7 %",

@@ -1,12 +1,14 @@
 """Production figures on the page: shifts, stops, parts, what is not known, and the way to the CSV."""
 
+from datetime import datetime
 from urllib.parse import parse_qs, urlsplit
+from zoneinfo import ZoneInfo
 
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
 from tests.cnctwin.page.conftest import Visit
-from tests.cnctwin.page.fake_server import Shop
-from tests.cnctwin.page.figures_document import HOSTILE, HOUR_MS
+from tests.cnctwin.page.fake_server import FakeServer, Shop
+from tests.cnctwin.page.figures_document import HOSTILE, HOUR_MS, ZONE, figures, told
 
 
 def test_the_figures_are_shown_and_what_is_not_known_says_why(visit: Visit, shop: Shop) -> None:
@@ -16,7 +18,9 @@ def test_the_figures_are_shown_and_what_is_not_known_says_why(visit: Visit, shop
     row = page.get_by_role("region", name="Figures by shift").get_by_role("row").filter(has_text="vmc, early")
     for figure in ("64.8 %", "80.0 %", "90.0 %", "7 h 30 min", "12.5 kWh"):
         expect(row).to_contain_text(figure)
-    expect(page.get_by_text("Availability: the machine was not heard for too much of the planned time.")).to_be_visible()
+    expect(
+        page.get_by_text("Availability: the machine was not heard for too much of the planned time (mill-01, early).")
+    ).to_be_visible()
     bar = page.get_by_role("img").first
     expect(bar).to_have_attribute(
         "aria-label", f"production 6 h 00 min, mode MANUAL 45 min 0 s, feed hold 30 min 0 s, alarm: {HOSTILE} 15 min 0 s"
@@ -46,3 +50,16 @@ def test_a_server_that_refuses_is_quoted(visit: Visit, shop: Shop) -> None:
     page = visit.open("#/figures")
     expect(page.get_by_text("The server says: no store was named")).to_be_visible()
     visit.errors.clear()  # the browser notes the status
+
+
+def test_times_are_those_of_the_shift_calendar_wherever_the_reader_is(browser: Browser, server: FakeServer, shop: Shop) -> None:
+    began = told()[0][0].begin
+    shop.answers["/figures"] = lambda _path, asked: figures(asked or {}, began)
+    visit = Visit(browser, server.url, zone="Asia/Tokyo")
+    page = visit.open("#/figures")
+    expect(page.get_by_text(f"Times in {ZONE}, the time zone of the shift calendar.")).to_be_visible()
+    row = page.get_by_role("region", name="Figures by shift").get_by_role("row").filter(has_text="vmc, early")
+    expect(row).to_contain_text(datetime.fromtimestamp(began / 1000, ZoneInfo(ZONE)).strftime("%H:%M"))
+    last = page.get_by_role("region", name="Parts with their energy").get_by_role("row").nth(1)
+    expect(last).to_contain_text(datetime.fromtimestamp(began / 1000 + 6000, ZoneInfo(ZONE)).strftime("%H:%M:%S"))
+    visit.context.close()

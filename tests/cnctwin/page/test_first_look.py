@@ -4,6 +4,7 @@ import re
 
 from playwright.sync_api import Browser, expect
 
+from cnctwin.api.fleet import NO_GAP
 from tests.cnctwin.page.conftest import Visit, expect_drawn
 from tests.cnctwin.page.fake_server import FakeServer, Shop
 from tests.cnctwin.page.simulated_shop import SignalValue
@@ -75,5 +76,25 @@ def test_the_address_of_the_parts_is_their_name_and_the_old_one_still_leads_ther
 def test_a_gap_that_is_not_known_says_so_and_one_that_is_says_in_what(visit: Visit, shop: Shop) -> None:
     page = visit.open("#/fleet")
     gap = page.locator("a.unit", has=page.get_by_text("vmc", exact=True)).locator(".cell.gaps")
-    expect(gap).to_have_text(re.compile(r"3.1× noise"))
-    expect(gap.locator(".figure")).to_have_attribute("title", re.compile("multiple of its noise"))
+    expect(gap).to_have_text(re.compile(r"3.1× repeatability"))
+    expect(gap.locator(".figure")).to_have_attribute("title", re.compile("what two runs of the same program differ by"))
+
+
+def test_where_no_gap_is_computed_the_fleet_says_which_processor_does_it(visit: Visit, shop: Shop) -> None:
+    shop.without["vmc"] = re.compile("twin/(gap_.*|spindle_temp_residual_k)")
+    page = visit.open("#/fleet")
+    gap = page.locator("a.unit", has=page.get_by_text("vmc", exact=True)).locator(".cell.gaps .figure")
+    expect(gap).to_have_text("–")
+    expect(gap).to_have_attribute("title", NO_GAP)
+
+
+def test_an_address_that_no_view_has_says_so_and_leads_to_the_fleet(visit: Visit) -> None:
+    page = visit.open("#/machines/vmc")
+    expect(page.get_by_text("There is no view machines.")).to_be_visible()
+    expect(page.get_by_role("link", name="Fleet", exact=True)).not_to_have_attribute("aria-current", "page")
+    page.get_by_role("link", name="To the fleet").click()
+    expect(page.get_by_role("heading", name="Fleet")).to_be_visible()
+    visit.open("#/constructor")
+    expect(page.get_by_text("There is no view constructor.")).to_be_visible()
+    visit.open("")
+    expect(page.get_by_role("heading", name="Fleet")).to_be_visible()

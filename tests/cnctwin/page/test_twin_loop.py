@@ -48,7 +48,7 @@ def press(page: Page, deed: str) -> None:
 
 def test_a_stranger_goes_from_the_open_gap_to_the_closed_one_and_opens_the_seal(visit: Visit, told: Loop) -> None:
     page = visit.open("#/gap/vmc")
-    expect(panel(page)).to_contain_text("The gap of the temperature is open at 6.1 floors")
+    expect(panel(page)).to_contain_text("The gap of the temperature is open at 6.1 × repeatability")
     expect(page.locator('[aria-current="step"]')).to_have_text("Watch")
     expect(panel(page)).to_contain_text(SHA256[:8])
     press(page, "diagnose")
@@ -68,7 +68,7 @@ def test_a_stranger_goes_from_the_open_gap_to_the_closed_one_and_opens_the_seal(
     press(page, "promote")
     expect(page.get_by_role("dialog")).to_contain_text("Back undoes it")
     page.get_by_role("dialog").get_by_role("button", name="Promote").click()
-    expect(panel(page)).to_contain_text("gap of the temperature 6.1 → 1.1 floors")
+    expect(panel(page)).to_contain_text("gap of the temperature 6.1 → 1.1 × repeatability")
     press(page, "reveal")
     page.get_by_role("dialog").get_by_role("button", name="Reveal").click()
     expect(panel(page).locator(".sealed")).to_contain_text("Gain 2.1")
@@ -107,7 +107,7 @@ def test_what_was_done_is_listed_and_can_be_undone(visit: Visit, told: Loop) -> 
     page = visit.open("#/gap/vmc")
     panel(page).get_by_text("What was done, 2 steps").click()
     row = panel(page).locator(".taken tbody tr").first
-    for text in ("Promoted", "ada", "coolant cools", "6.1 → 1.1 floors"):
+    for text in ("Promoted", "ada", "coolant cools", "6.1 → 1.1 × repeatability"):
         expect(row).to_contain_text(text)
     press(page, "back")
     page.get_by_role("dialog").get_by_role("button", name="Go back").click()
@@ -150,7 +150,7 @@ def test_the_keyboard_diagnoses(visit: Visit, told: Loop) -> None:
 def test_the_machine_view_tells_it_in_one_line(visit: Visit, told: Loop) -> None:
     told.step = "promoted"
     page = visit.open("#/machine/vmc")
-    expect(page.locator(".loopline")).to_contain_text("Coolant cools: gap of the temperature 6.1 → 1.1 floors")
+    expect(page.locator(".loopline")).to_contain_text("Coolant cools: gap of the temperature 6.1 → 1.1 × repeatability")
     page.locator(".loopline a").click()
     expect(page).to_have_url(re.compile("#/gap/vmc"))
 

@@ -93,6 +93,7 @@ def test_a_shift_adds_up_by_hand(calendar: Path) -> None:
     actions = fed(engine, *_alive(3700.0, *_shift_of_parts()))
     (shift,) = _records(actions, "shift")
     assert (shift["shift"], shift["over"], (shift["end"] - shift["begin"]) / 1000) == ("early", True, 3600.0)
+    assert shift["time_zone"] == "UTC"
     assert shift["planned_s"] == 3000.0  # without the break of ten minutes
     assert shift["production_s"] == 500.0
     assert shift["down_s"] == 60.0

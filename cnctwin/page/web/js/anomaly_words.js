@@ -60,12 +60,12 @@ export function sentenceOf(why, told) {
   return `${title(text(why.signal) || "a signal")} ${away(why)} ${against(why.by)}${where(why)}${scale ? `, ${scale}` : ""}${when}.`;
 }
 
-/** Labelled alarms that it looks like: "Looks like: packed chips (0.91, 2026-11-03 10:40)." */
+/** Labelled alarms that it looks like: "Looks like: packed chips (likeness 0.91, 2026-11-03 10:40)." */
 export function likes(why) {
   const known = list(why.like).filter((one) => one && text(one.label) && isNumber(one.likeness));
   if (!known.length) return "It looks like no alarm that has a name.";
   return `Looks like: ${known
-    .map((one) => `${one.label} (${fixed(one.likeness, 2)}, ${moment(one.at_s * 1000, { seconds: false })})`)
+    .map((one) => `${one.label} (likeness ${fixed(one.likeness, 2)}, ${moment(one.at_s * 1000, { seconds: false })})`)
     .join("; ")}.`;
 }
 

@@ -17,6 +17,7 @@ import * as fleet from "./views/fleet.js";
 import * as gap from "./views/gap.js";
 import * as jobs from "./views/jobs.js";
 import * as machine from "./views/machine.js";
+import * as noView from "./views/no_view.js";
 import * as parts from "./views/parts.js";
 import * as replay from "./views/replay.js";
 
@@ -68,8 +69,8 @@ function place() {
   } catch {
     /* a broken address is no machine */
   }
-  const view = RENAMED[name] ?? name;
-  return { name: view in VIEWS ? view : "fleet", machine: machineName || null, search: new URLSearchParams(search ?? "") };
+  const view = RENAMED[name] ?? (name || "fleet");
+  return { name: view, machine: machineName || null, search: new URLSearchParams(search ?? "") };
 }
 
 export const address = (name, machineName, search) =>
@@ -84,7 +85,7 @@ function route() {
   shown = hash;
   app.view?.close?.();
   if (at.machine) app.chosen = at.machine;
-  app.view = VIEWS[at.name].open(app, at);
+  app.view = (VIEWS[at.name] ?? noView).open(app, at);
   app.view.name = at.name;
   main.replaceChildren(app.view.element);
   document.title = `${app.view.title} · cnctwin`;

@@ -94,14 +94,14 @@ export function numbers(machine) {
   return [names.filter((name) => !name.startsWith(TWIN_PREFIX)), names.filter((name) => name.startsWith(TWIN_PREFIX))];
 }
 
-/** [t, v] of a number from `from` to `to`, its first sample moved to `from`, its last value held until `to` where it still holds. */
-export function line(machine, signal, from, to, holds = true) {
+/** [t, v] of a number from `from` to `to`, its first sample moved to `from`, its last value held until `held`. */
+export function line(machine, signal, from, to, held) {
   const ring = signal ? machine.series.get(signal) : null;
   if (!(ring instanceof Ring) || !ring.length) return [[], []];
   const [t, v] = ring.since(from, to);
   if (t.length && t[0] < from) t[0] = from;
-  if (t.length && holds && t[t.length - 1] < to && !Number.isNaN(v[v.length - 1])) {
-    t.push(to);
+  if (t.length && t[t.length - 1] < held && !Number.isNaN(v[v.length - 1])) {
+    t.push(held);
     v.push(v[v.length - 1]);
   }
   return [t, v];
@@ -131,6 +131,7 @@ export function difference(a, b) {
 
 /** The value of a signal that held at t; null where none is known. */
 export function valueAt(machine, signal, t) {
+  if (t > machine.knownUntil()) return null;
   const series = machine.series.get(signal);
   if (series instanceof Steps) return series.at(t) ?? null;
   if (!(series instanceof Ring)) return null;

@@ -5,7 +5,7 @@ import { clockOffset } from "./clock.js";
 import { el, symbol, table } from "./dom.js";
 import { lag } from "./lag.js";
 import { may, me } from "./me.js";
-import { age, execution, fixed, moment, words } from "./text.js";
+import { REPEATABILITY, REPEATABILITY_MEANS, age, execution, fixed, moment, words } from "./text.js";
 
 const dialog = () => document.getElementById("dialog");
 
@@ -72,9 +72,10 @@ export function openHelp(app, everywhere) {
         "li",
         {},
         el("span", { class: "key gate" }),
-        el("span", {}, "tool change, with its tail: scores are not judged (the gate)"),
+        el("span", {}, "suppression window: a tool change and what follows it, when scores are not judged"),
       ),
       el("li", {}, el("span", { class: "key old" }), el("span", {}, "stale: nothing was heard in this stretch")),
+      el("li", {}, el("span", { class: "figure" }, REPEATABILITY), el("span", {}, REPEATABILITY_MEANS.replace("repeatability: ", ""))),
     ),
   );
 }
@@ -123,7 +124,7 @@ export function openLink(app) {
         ? el("button", { type: "button", class: "button", onclick: openDeeds }, "Who did what")
         : null,
       me.logsOut ? el("button", { type: "button", class: "button", onclick: () => logOut(app) }, "Log out") : null,
-      el("button", { type: "button", class: "button", onclick: () => app.stream.restart() }, "Connect anew"),
+      el("button", { type: "button", class: "button", onclick: () => app.stream.restart() }, "Reconnect"),
     ),
   );
   fill();
@@ -168,7 +169,7 @@ async function logOut(app) {
 function healthRows(health) {
   const parts = health?.parts ?? {};
   const entries = Array.isArray(parts) ? parts.map((one) => [one.name ?? one.part, one]) : Object.entries(parts);
-  if (!entries.length) return [el("li", {}, String(health?.status ?? "no parts are told"))];
+  if (!entries.length) return [el("li", {}, String(health?.status ?? "the server names no parts"))];
   return entries.map(([name, part]) => {
     const state = typeof part === "string" ? part : (part.state ?? part.status ?? (part.ok === false ? "not well" : "ok"));
     const reason = typeof part === "object" ? (part.reason ?? part.text ?? "") : "";

@@ -4,7 +4,7 @@ import { Chart, aligned } from "./chart.js";
 import { SCORES, difference, line, stretches, toolMarks, unknown } from "./charted.js";
 import { el, setHidden, setText } from "./dom.js";
 import { Strip, stateItems, toolItems } from "./strip.js";
-import { moment, number, title } from "./text.js";
+import { SUPPRESSION_MEANS, moment, number, title } from "./text.js";
 import { TOOL_CHANGE_GATE, TWIN_PREFIX } from "./vocabulary.js";
 
 let count = 0;
@@ -30,7 +30,7 @@ export class Panels {
       el(
         "div",
         { class: "keyrow" },
-        el("span", { class: "key gate" }, "tool change (gate)"),
+        el("span", { class: "key gate", title: SUPPRESSION_MEANS }, "suppression window (tool change)"),
         el("span", { class: "key tool" }, "tool"),
         el("span", { class: "key old" }, "nothing known"),
       ),
@@ -124,16 +124,18 @@ export class Panels {
     }
   }
 
-  /** Draws [from, to]. live: values hold until `to`; lanes: items of the further lanes of the strip. */
+  /** Draws [from, to]. live: values hold until `to`, or until the newest moment that is known; lanes: items of the further lanes of
+   * the strip. */
   draw(from, to, live, lanes = []) {
     const { machine, charted } = this,
       range = [from, to];
-    const gates = stretches(machine, TOOL_CHANGE_GATE, from, to).filter(([, , on]) => on === true);
-    const tools = toolMarks(machine, from, to);
-    const holds = live && machine.online;
+    const end = Math.min(to, machine.online ? machine.knownUntil() : (machine.offlineSince ?? to));
+    const gates = stretches(machine, TOOL_CHANGE_GATE, from, end).filter(([, , on]) => on === true);
+    const tools = toolMarks(machine, from, end);
+    const holds = live && machine.online ? end : -Infinity;
     const own = line(machine, charted.own, from, to, holds),
-      stale = charted.own.startsWith(TWIN_PREFIX) ? [] : unknown(own, to);
-    if (!machine.online && machine.offlineSince !== null) stale.push([Math.max(from, machine.offlineSince), to]);
+      stale = charted.own.startsWith(TWIN_PREFIX) ? [] : unknown(own, end);
+    if (end < to) stale.push([Math.max(from, end), to]);
     const marks = { gates, tools, stale };
     const twin = charted.twin ? line(machine, charted.twin, from, to, holds) : null;
     const learned = charted.learned ? line(machine, charted.learned, from, to, holds) : null;
@@ -157,7 +159,6 @@ export class Panels {
     this.#read();
     if (performance.now() - this.stripAt > 450) {
       this.stripAt = performance.now();
-      const end = machine.online ? to : (machine.offlineSince ?? to);
       this.strip.show(
         [
           [

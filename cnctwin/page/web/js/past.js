@@ -3,6 +3,7 @@
 import { get, part, query } from "./api.js";
 import { CONTEXT, SCORES, TILES } from "./charted.js";
 import { Machine } from "./plant.js";
+import { unitWord } from "./text.js";
 import { ALERT_STATE, ANOMALY_ALARM, TWIN_PREFIX } from "./vocabulary.js";
 
 const COLUMNS = 1200;
@@ -58,9 +59,11 @@ export async function addBefore(name, columns, start, signal) {
   }
 }
 
-/** A machine that has lived through these columns. What a signal means is taken from what is known of it now. */
+/** A machine that has lived through these columns, up to the newest moment that is known of it. What a signal means is taken from
+ * what is known of it now. */
 export function livedThrough(known, columns) {
   const past = new Machine(known.name);
+  past.until = Math.max(known.knownUntil(), ...columns.map((column) => column.t?.at(-1) ?? -Infinity));
   for (const column of columns) {
     if (!column.t?.length) continue;
     past.backfill(column);
@@ -69,7 +72,7 @@ export function livedThrough(known, columns) {
     past.values.set(column.signal, {
       value: column.value[last],
       t: column.t[last],
-      unit: column.unit ?? held?.unit ?? null,
+      unit: column.unit ? unitWord(column.unit) : (held?.unit ?? null),
       quality: "good",
       reason: column.reason?.[last] ?? null,
       provenance: held?.provenance ?? (column.signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured"),

@@ -2,6 +2,7 @@
 
 import { serverNow } from "./clock.js";
 import { Ring, Steps } from "./ring.js";
+import { unitWord } from "./text.js";
 import {
   ADJUSTED_SCORE,
   ALERT_STATE,
@@ -31,12 +32,20 @@ export class Machine {
     this.otherClock = false;
     this.skews = 0;
     this.changed = new Set();
-    this.threshold = null;
+    this.until = null;
+    this.gap = null;
+    this.gapReason = null;
   }
 
   /** Now, by the clock that stamps this machine's values. A machine of another clock (a time lapse) is as old as its newest value. */
   now() {
-    return this.otherClock ? this.lastT + (performance.now() - this.lastHeard) : serverNow();
+    return this.otherClock ? Math.round(this.lastT + (performance.now() - this.lastHeard)) : serverNow();
+  }
+
+  /** The newest moment of which anything is known: values hold until then, and nothing does beyond it. A machine that has lived
+   * through a stretch of the past (`until`) knows nothing of later. */
+  knownUntil() {
+    return this.until ?? (this.online ? this.now() : this.lastT);
   }
 
   value(signal) {
@@ -62,15 +71,15 @@ export class Machine {
   know(signal, given, { series }) {
     if (!given || typeof given !== "object" || !("value" in given)) return;
     if (!this.values.has(signal) && this.values.size >= SIGNALS_MAX) return;
-    const provenance = given.provenance ?? (signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured");
+    const held = this.values.get(signal);
     this.values.set(signal, {
       value: given.value,
       t: given.t ?? NaN,
-      unit: given.unit ?? null,
+      unit: given.unit ? unitWord(given.unit) : (held?.unit ?? null),
       quality: given.quality ?? "good",
       reason: given.reason ?? null,
-      provenance,
-      meaning: given.meaning ?? null,
+      provenance: given.provenance ?? held?.provenance ?? (signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured"),
+      meaning: given.meaning ?? held?.meaning ?? null,
     });
     this.changed.add(signal);
     if (Number.isFinite(given.t) && given.t > this.lastT) this.lastT = given.t;
@@ -146,6 +155,17 @@ export class Machine {
     if (this.skews >= 3) [this.otherClock, this.skews] = [far, 0];
   }
 
+  /** The whole of it: `/state/{machine}`. A signal that is not in it the machine does not have. */
+  state({ measured, twin, online, now }) {
+    const all = new Map(Object.entries(measured ?? {}));
+    for (const [signal, given] of Object.entries(twin ?? {}))
+      all.set(signal.startsWith(TWIN_PREFIX) ? signal : TWIN_PREFIX + signal, given);
+    for (const signal of [...this.values.keys()]) if (!all.has(signal)) this.values.delete(signal);
+    for (const [signal, given] of all) this.know(signal, given, { series: true });
+    if (this.lastT - now > OTHER_CLOCK_MS) [this.otherClock, this.lastHeard] = [true, performance.now()]; // stamped ahead of the server
+    this.setOnline(Boolean(online), this.lastT === -Infinity ? null : this.lastT);
+  }
+
   setOnline(online, at) {
     if (online === this.online && (this.offlineSince === null) === online) return;
     this.online = online;
@@ -196,11 +216,12 @@ export class Plant {
       if (!machine || (adds && !isNew)) continue;
       for (const [key, signal] of Object.entries(signals)) {
         const given = item[key];
-        if (given === undefined) continue;
+        if (given === undefined || (given === null && !machine.values.has(signal))) continue; // null there also means: has none
         const stale = { value: given, t: item.last_t, quality: item.online ? (given === null ? "bad" : "good") : "stale" };
         machine.know(signal, given !== null && typeof given === "object" ? given : stale, { series: FLEET_SERIES.has(signal) });
       }
       machine.gap = item.gap ?? null;
+      machine.gapReason = item.gap_reason ?? null;
       if (item.last_t > machine.lastT) machine.lastT = item.last_t;
       machine.setOnline(Boolean(item.online), item.last_t ?? null);
     }
@@ -225,12 +246,7 @@ export class Plant {
   /** The whole state of a machine: `/state/{machine}`. */
   state(state) {
     const machine = this.machine(state.machine);
-    if (!machine) return null;
-    const keep = { series: true };
-    for (const [signal, given] of Object.entries(state.measured ?? {})) machine.know(signal, given, keep);
-    for (const [signal, given] of Object.entries(state.twin ?? {}))
-      machine.know(signal.startsWith(TWIN_PREFIX) ? signal : TWIN_PREFIX + signal, given, keep);
-    machine.setOnline(Boolean(state.online), machine.lastT === -Infinity ? null : machine.lastT);
+    machine?.state(state);
     return machine;
   }
 

@@ -69,7 +69,7 @@ export const stateItems = (stretches) =>
 
 /** Items of a lane of tools, and of gates behind them. */
 export const toolItems = (tools, gates) => [
-  ...gates.filter(([, , on]) => on === true).map(([from, to]) => ({ from, to, text: "", kind: "gate", title: "tool change" })),
+  ...gates.filter(([, , on]) => on === true).map(([from, to]) => ({ from, to, text: "", kind: "gate", title: "suppression window (tool change)" })),
   ...tools.map(([from, to, tool]) => ({
     from,
     to,

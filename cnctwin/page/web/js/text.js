@@ -9,6 +9,7 @@ import {
   COMMON_MODE,
   CUTTING_FORCE_N,
   GAP_GROWING,
+  GATED_SHARE_PCT,
   RAW_SCORE,
   SCORE_DRIFT,
   SPINDLE_TEMP_C,
@@ -39,7 +40,7 @@ const TITLES = lookup({
   controller_mode: "Mode",
   tool_number: "Tool",
   tool_change_active: "Tool change",
-  tool_change_source: "Tool change told by",
+  tool_change_source: "Tool change reported by",
   spindle_temp_c: "Spindle temperature",
   ambient_temp_c: "Ambient",
   vibration_rms_g: "Vibration",
@@ -54,7 +55,8 @@ const TITLES = lookup({
   [CUTTING_FORCE_N]: "Cutting force",
   [RAW_SCORE]: "Raw score",
   [ADJUSTED_SCORE]: "Adjusted score",
-  [TOOL_CHANGE_GATE]: "Gate",
+  [TOOL_CHANGE_GATE]: "Suppression window",
+  [GATED_SHARE_PCT]: "Time in suppression windows",
   [ANOMALY_THRESHOLD]: "Threshold",
   [ANOMALY_ALARM]: "Anomaly alarm",
   [COMMON_MODE]: "Common mode",
@@ -180,6 +182,10 @@ export function rounded(value, unit = null) {
   return places === null ? value : Number(value.toFixed(places));
 }
 
+/** a − b of two values as they are shown, with its sign and unit: what a reader who subtracts them gets. */
+export const between = (a, b) =>
+  `${signed(rounded(a.value, a.unit) - rounded(b.value, b.unit), a.unit)} ${a.unit === "°C" ? "K" : (a.unit ?? "")}`.trim();
+
 /** Any value without its unit. */
 export function plain(value, unit = null) {
   if (value === null || value === undefined) return "–";
@@ -192,7 +198,17 @@ export function plain(value, unit = null) {
 export const signed = (value, unit = null) =>
   value > 0 && number(value, unit) !== "0" ? `+${number(value, unit)}` : number(value, unit);
 
-/** Two digits that count: of a gap in floors more would be noise. */
+/** The unit of gaps in words, and what it means; the interface calls it floors. */
+export const REPEATABILITY = "× repeatability";
+export const REPEATABILITY_MEANS = "repeatability: what two runs of the same program differ by on a healthy machine";
+const UNITS = lookup({ floors: REPEATABILITY });
+
+/** A unit as a person reads it. */
+export const unitWord = (unit) => UNITS[unit] ?? unit;
+
+export const SUPPRESSION_MEANS = "around a tool change, when scores are not judged";
+
+/** Two digits that count: of a gap over the repeatability more would be noise. */
 export const coarse = (value) =>
   !Number.isFinite(value) ? "–" : Math.abs(value) >= 10 ? fixed(value, 0) : digits(value, 2);
 
@@ -217,15 +233,36 @@ export function duration(ms) {
 
 const two = (value) => String(value).padStart(2, "0");
 
-/** A moment: time of day, with the date where it is not today. */
-export function moment(t, { seconds = true, now = Date.now() } = {}) {
+const clocks = new Map();
+
+/** [date, time of day] by the clock on the wall: of the reader's zone, or of another one by its name. */
+function onTheWall(t, zone) {
+  if (!zone) {
+    const at = new Date(t);
+    const time = [at.getHours(), at.getMinutes(), at.getSeconds()];
+    return [`${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`, time.map(two).join(":")];
+  }
+  if (!clocks.has(zone))
+    clocks.set(zone, new Intl.DateTimeFormat("sv-SE", { timeZone: zone, dateStyle: "short", timeStyle: "medium" })); // as ISO 8601
+  return clocks.get(zone).format(t).split(" ");
+}
+
+/** The name of a time zone where this browser knows it, else UTC. */
+export function knownZone(name) {
+  try {
+    new Intl.DateTimeFormat("sv-SE", { timeZone: name });
+    return name ?? "UTC";
+  } catch {
+    return "UTC";
+  }
+}
+
+/** A moment: time of day, with the date where it is not today; in the reader's time zone, or in `zone`. */
+export function moment(t, { seconds = true, now = Date.now(), zone = null } = {}) {
   if (!Number.isFinite(t)) return "–";
-  const at = new Date(t),
-    today = new Date(now);
-  const time = `${two(at.getHours())}:${two(at.getMinutes())}${seconds ? `:${two(at.getSeconds())}` : ""}`;
-  return at.toDateString() === today.toDateString()
-    ? time
-    : `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${time}`;
+  const [date, clock] = onTheWall(t, zone),
+    time = seconds ? clock : clock.slice(0, 5);
+  return date === onTheWall(now, zone)[0] ? time : `${date} ${time}`;
 }
 
 /** A moment as a `datetime-local` field holds it, and back. */
@@ -249,6 +286,9 @@ export function recorded(signal) {
 
 /** A sentence begins with a capital. */
 export const sentence = (text) => capital(String(text ?? ""));
+
+/** A text of loop or diagnosis, also one of a record from before, with the unit of its gaps as this page calls it. */
+export const inPageWords = (text) => String(text ?? "").replace(/(\d) floors\b/g, `$1 ${REPEATABILITY}`);
 
 /** The name of an effect or a part, in words. */
 export const words = (name) => capital(String(name ?? "").replaceAll("_", " "));

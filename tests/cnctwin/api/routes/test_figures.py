@@ -23,6 +23,7 @@ def _shift(begin: int, *, over: bool = True) -> str:
     stops = {"feed hold": {"kind": "delay", "s": 600.0, "n": 3}}
     times = {"planned_s": 3600.0, "production_s": 3000.0, "setup_s": 0.0, "delay_s": 600.0, "down_s": 0.0, "unknown_s": 0.0}
     head = {"kind": "shift", "id": f"shift-{begin}", "machine": "vmc", "shift": "early", "begin": begin, "end": begin + HOUR_MS}
+    head["time_zone"] = "Europe/Berlin"
     rest = {"over": over, "calendar": True, "beside_s": 0.0, "stops": stops, "energy_kwh": 1.5, "energy_s": 3600.0}
     return json.dumps(head | times | rest)
 
@@ -65,6 +66,7 @@ def test_shifts_have_their_figures_and_the_one_that_runs_is_among_them(client: C
     assert over["stops"] == {"feed hold": {"kind": "delay", "s": 600.0, "n": 3}}
     assert (running["over"], running["oee"], running["why"]["performance"]) == (False, None, "no complete part has ended")
     assert (told["refused"], told["left_out"], told["note"]) == (1, 0, "")
+    assert told["time_zone"] == "Europe/Berlin"
 
 
 @pytest.mark.parametrize(("by", "rows"), [("machine", 1), ("part", 4), ("program", 1)])

@@ -3,10 +3,14 @@
 import json
 import math
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from cnctwin.api.fleet import NO_GAP, fleet_item
 from cnctwin.api.live.plant import LivePlant
+from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import EDGE, THERMAL, Client, birth, client_of, data, death, now, reading, small_plant
 
@@ -54,7 +58,19 @@ def test_the_fleet_says_of_each_machine_what_an_overview_needs(client: Client) -
     assert {name: item[name] for name in ("machine", "online", "exec_state", "tool_number", "gap", "last_t")} == {
         "machine": "vmc", "online": True, "exec_state": "ACTIVE", "tool_number": 5, "gap": 1.5, "last_t": 1000,
     }  # fmt: skip
-    assert item["score"] is None
+    assert (item["score"], item["gap_reason"]) == (None, None)
+
+
+def test_a_gap_that_is_not_known_says_why_and_one_that_nothing_computes_names_the_processor() -> None:
+    def item(*told: tuple[str, str]) -> dict[str, Any]:
+        bad = [Reading(name, None, 0, Quality.BAD, "floors", reason, False) for name, reason in told]
+        return fleet_item("vmc", True, {one.name: SimpleNamespace(reading=one) for one in bad})
+
+    offered, few = "axis_a_pos_mm is not offered", "less than 60 s seen"
+    assert item()["gap_reason"] == NO_GAP
+    axes = [(f"twin/gap_axis_{letter}_pos_mm", offered) for letter in "abc"]
+    assert item(*axes, ("twin/gap_spindle_temp_c", few))["gap_reason"] == few
+    assert item(*axes)["gap_reason"] == offered
 
 
 def test_a_death_makes_values_stale_and_a_birth_makes_them_good_again() -> None:

@@ -90,7 +90,7 @@ export function open(app) {
     const { machine = "", alertname = "" } = alert.labels ?? {};
     const hours = el("input", { class: "field", name: "hours", type: "number", min: "0.1", max: "720", step: "any", value: "2" });
     const about = [
-      el("p", {}, el("strong", {}, machine), `: ${words(alertname)} is told to nobody for a while. It stays on this page.`),
+      el("p", {}, el("strong", {}, machine), `: nobody is notified of ${words(alertname)} for a while. It stays on this page.`),
       el("label", { class: "named" }, "For how many hours", hours),
     ];
     openSigned("Silence", about, "Silence", async (by, comment) => {
@@ -108,14 +108,14 @@ export function open(app) {
     const facts = [
       el("span", {}, el("span", { class: "severity" }, alert.severity ?? ""), ` · ${alert.phase}`),
       el("span", {}, `since ${moment(start)} (${age((end ?? serverNow()) - start)})`),
-      end ? el("span", {}, `over at ${moment(end)}`) : null,
+      end ? el("span", {}, `resolved at ${moment(end)}`) : null,
       alert.acknowledged_by
         ? el("span", {}, `${alert.acknowledged_by}${alert.comment ? `: “${alert.comment}”` : " takes care of it"}`)
         : null,
       alert.silenced_by ? el("span", {}, `silenced (${alert.silenced_by})`) : null,
       alert.flapping ? el("span", {}, "comes and goes") : null,
       alert.unknown ? el("span", {}, `cannot be read now: ${alert.unknown}`) : null,
-      Array.isArray(alert.told) && alert.told.length ? el("span", {}, `told: ${alert.told.join(", ")}`) : null,
+      Array.isArray(alert.told) && alert.told.length ? el("span", {}, `notified: ${alert.told.join(", ")}`) : null,
       alert.undelivered ? el("span", {}, "not delivered") : null,
     ];
     const key = alert.fingerprint;
@@ -175,7 +175,7 @@ export function open(app) {
       : null;
 
   function endSilence(one) {
-    const about = el("p", {}, `${one.comment || "It"}: alerts that it keeps quiet are told to people again.`);
+    const about = el("p", {}, `${one.comment || "It"}: people are notified again of the alerts that it keeps quiet.`);
     openSigned("End this silence?", about, "End it", async (by) => {
       await post(`silences/${part(one.id ?? "")}/end`, { by });
       say("Ended");
@@ -220,7 +220,7 @@ export function open(app) {
       return el(
         "section",
         {},
-        el("h2", {}, "Who is told"),
+        el("h2", {}, "Who is notified"),
         el("p", { class: "quiet" }, "No receiver is configured: alerts are on the broker and on this page only."),
       );
     const last = (one) =>
@@ -230,8 +230,8 @@ export function open(app) {
     return el(
       "section",
       {},
-      el("h2", {}, "Who is told"),
-      table(["Receiver", "Delivered", "Failed", "Waiting", ""], rows, { numbers: [1, 2, 3], label: "Who is told" }),
+      el("h2", {}, "Who is notified"),
+      table(["Receiver", "Delivered", "Failed", "Waiting", ""], rows, { numbers: [1, 2, 3], label: "Who is notified" }),
       failures?.length
         ? el(
             "ul",

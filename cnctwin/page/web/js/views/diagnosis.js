@@ -2,7 +2,7 @@
 
 import { columnHead, drawn, el, say, symbol } from "../dom.js";
 import { lookup } from "../lookup.js";
-import { number, recorded, sentence, share, words } from "../text.js";
+import { REPEATABILITY, inPageWords, number, recorded, sentence, share, words } from "../text.js";
 import { partsSections } from "./diagnosis_parts.js";
 import { shade } from "./gap_shade.js";
 
@@ -49,14 +49,14 @@ function verdict(diagnosis, report) {
       "div",
       { class: "verdict" },
       el("span", { class: "called", "data-verdict": diagnosis.verdict }, symbol(sign), word),
-      el("p", { class: "sentence" }, String(diagnosis.sentence ?? "")),
+      el("p", { class: "sentence" }, inPageWords(diagnosis.sentence)),
     ),
     el(
       "dl",
       { class: "figures" },
-      fact("Gap, before → after", `${number(gap.before)} → ${number(gap.after)}`, "rms over the floor, on runs not fitted"),
+      fact("Gap, before → after", `${number(gap.before)} → ${number(gap.after)}`, `rms, ${REPEATABILITY}, on runs not fitted`),
       fact("Closed of what can be closed", share(gap.closure), between),
-      fact("Floor", number(gap.floor ?? 1), "what repeated runs differ by"),
+      fact("Repeatability", number(gap.floor ?? 1), "what two runs of the same program differ by"),
       Number.isFinite(gap.as_stated) ? fact("As stated", number(gap.as_stated), "before constants were refitted") : null,
     ),
     report
@@ -95,7 +95,7 @@ function where(cells) {
           el(
             "tr",
             {},
-            ["Signal", "Regime", "Share of the gap", "Floors", "In words"].map((text, i) =>
+            ["Signal", "Regime", "Share of the gap", REPEATABILITY, "In words"].map((text, i) =>
               columnHead(text, i === 2),
             ),
           ),
@@ -152,7 +152,7 @@ function shrinks(gap) {
           el(
             "tr",
             {},
-            ["Signal", "Before", "After", "Floor", "Unit", "● before, ■ after, over the floor (left edge), logarithmic"].map(
+            ["Signal", "Before", "After", "Repeatability", "Unit", "● before, ■ after, from the repeatability on (left edge), logarithmic"].map(
               (text, i) => columnHead(text, i > 0 && i < 4),
             ),
           ),

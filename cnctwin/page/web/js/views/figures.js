@@ -2,9 +2,9 @@
 
 import { get, query } from "../api.js";
 import { serverNow } from "../clock.js";
-import { drawn, el, table } from "../dom.js";
+import { drawn, el, setText, table } from "../dom.js";
 import { lookup } from "../lookup.js";
-import { duration, fixed, moment, number, plain, sentence } from "../text.js";
+import { duration, fixed, knownZone, moment, number, plain, sentence } from "../text.js";
 
 const HOUR_MS = 3600000;
 const STRETCHES = [
@@ -20,23 +20,32 @@ const BYS = [
 const KINDS = lookup({ production: "production", setup: "setup", delay: "delay", down: "down, an alarm", unknown: "not heard" });
 const BARS_MAX = 40;
 const PARTS_MAX = 200;
+const NAMED_MAX = 3;
 const ALL = "";
 const list = (value) => (Array.isArray(value) ? value : []);
 const pct = (value) => (Number.isFinite(value) ? `${fixed(100 * value, 1)} %` : "–");
 const kwh = (value) => (Number.isFinite(value) ? `${number(value)} kWh` : "–");
 const spent = (seconds) => (Number.isFinite(seconds) ? duration(1000 * Math.round(seconds)) : "–");
 const named = (row) => (row.shift === undefined ? row.machine : `${row.machine}, ${row.shift ?? "no shift"}`);
-const when = (row) => moment(row.begin, { seconds: false }) + (row.over === false ? ", runs" : "");
+const when = (row, zone) => moment(row.begin, { seconds: false, zone }) + (row.over === false ? ", so far" : "");
 
-/** The reasons why figures are missing, each once. */
+/** The reasons why figures are missing, each once, with the rows that it is of where it is not of all. */
 function reasons(rows) {
-  const said = new Set();
+  const of = new Map();
   for (const row of rows)
-    for (const [name, why] of Object.entries(row.why ?? {})) if (name !== "oee") said.add(`${sentence(name)}: ${why}.`);
-  return said.size ? el("div", { class: "note" }, [...said].map((text) => el("p", {}, text))) : null;
+    for (const [name, why] of Object.entries(row.why ?? {}))
+      if (name !== "oee") of.set(`${name}: ${why}`, [...(of.get(`${name}: ${why}`) ?? []), named(row)]);
+  const whose = (names) => {
+    const each = [...new Set(names)],
+      more = each.length - NAMED_MAX;
+    return names.length === rows.length ? "" : ` (${each.slice(0, NAMED_MAX).join("; ")}${more > 0 ? ` and ${more} more` : ""})`;
+  };
+  return of.size
+    ? el("div", { class: "note" }, [...of].map(([text, names]) => el("p", {}, `${sentence(text)}${whose(names)}.`)))
+    : null;
 }
 
-function oee(rows, by) {
+function oee(rows, by, zone) {
   if (by === "program")
     return table(
       ["Program", "Machine", "Parts", "Good", "Scrap", "Ideal", "Actual", "Performance", "Energy a part"],
@@ -58,7 +67,7 @@ function oee(rows, by) {
     [by === "shift" ? "Machine, shift" : "Machine", "Began", ...heads],
     rows.map((row) => [
       named(row),
-      when(row),
+      when(row, zone),
       el("strong", {}, pct(row.oee)),
       pct(row.availability),
       pct(row.performance),
@@ -74,7 +83,7 @@ function oee(rows, by) {
 }
 
 /** One bar: what the time of a shift went to, the stops by reason, longest first. */
-function stopBar(row) {
+function stopBar(row, zone) {
   const stops = Object.entries(row.stops ?? {}).map(([reason, one]) => [reason, one.kind, one.s, one.n]);
   const pieces = [["production", "production", row.production_s, null], ...stops].filter(([, , seconds]) => seconds > 0);
   const whole = pieces.reduce((sum, [, , seconds]) => sum + seconds, 0);
@@ -92,7 +101,7 @@ function stopBar(row) {
   return el(
     "div",
     { class: "stopbar" },
-    el("p", { class: "what" }, el("strong", {}, named(row)), el("span", { class: "quiet" }, when(row))),
+    el("p", { class: "what" }, el("strong", {}, named(row)), el("span", { class: "quiet" }, when(row, zone))),
     bar,
     el(
       "details",
@@ -116,7 +125,7 @@ const key = () =>
     ),
   );
 
-function parts(rows) {
+function parts(rows, zone) {
   if (!rows.length) return el("p", { class: "note" }, "No part has ended in this stretch.");
   return table(
     ["Ended", "Machine", "Program", "Shift", "Ideal", "Actual", "Performance", "Energy", "Quality"],
@@ -124,7 +133,7 @@ function parts(rows) {
       .slice(-PARTS_MAX)
       .reverse()
       .map((row) => [
-        moment(row.end),
+        moment(row.end, { zone }),
         row.machine,
         plain(row.program),
         plain(row.shift),
@@ -176,12 +185,19 @@ export function open(app, { machine: asked }) {
     made = el("div", {}),
     csv = el("a", { class: "button", download: true }, "CSV"),
     partsCsv = el("a", { class: "button", download: true }, "CSV of the parts");
-  let turn = 0;
+  const zoneSaid = el("p", { class: "note" });
+  let turn = 0,
+    isOtherClock = null;
+
+  const seen = () => [...app.plant.machines.values()].filter((one) => !chosen.machine || one.name === chosen.machine);
+  /** Now, by the clock that stamps what is shown: a time lapse runs ahead, a recording behind. */
+  const newest = () => Math.max(...(seen().length ? seen().map((one) => Math.max(one.now(), one.lastT)) : [serverNow()]));
+  const hasOtherClock = () => seen().some((one) => one.otherClock);
 
   async function load() {
+    isOtherClock = hasOtherClock();
     const mine = ++turn,
-      newest = Math.max(serverNow(), ...[...app.plant.machines.values()].map((one) => one.lastT)), // a time lapse runs ahead
-      to = Math.round(newest),
+      to = Math.round(newest()),
       base = { machine: chosen.machine || null, from: to - chosen.stretch, to };
     csv.setAttribute("href", query("figures", { ...base, by: chosen.by, format: "csv" }));
     partsCsv.setAttribute("href", query("figures", { ...base, by: "part", format: "csv" }));
@@ -189,10 +205,12 @@ export function open(app, { machine: asked }) {
     try {
       const [main, bars, each] = await Promise.all([told(chosen.by), told(chosen.by === "machine" ? "machine" : "shift"), told("part")]);
       if (mine !== turn) return;
-      const rows = list(main?.rows);
-      shifts.replaceChildren(...(rows.length ? [oee(rows, chosen.by), reasons(rows)].filter(Boolean) : [nothing(main?.note ?? "")]));
-      stops.replaceChildren(...list(bars?.rows).slice(-BARS_MAX).map(stopBar).filter(Boolean));
-      made.replaceChildren(parts(list(each?.rows)));
+      const rows = list(main?.rows),
+        zone = knownZone(main?.time_zone);
+      setText(zoneSaid, `Times in ${zone}${zone === "UTC" ? "" : ", the time zone of the shift calendar"}.`);
+      shifts.replaceChildren(...(rows.length ? [oee(rows, chosen.by, zone), reasons(rows)].filter(Boolean) : [nothing(main?.note ?? "")]));
+      stops.replaceChildren(...list(bars?.rows).slice(-BARS_MAX).map((row) => stopBar(row, zone)).filter(Boolean));
+      made.replaceChildren(parts(list(each?.rows), zone));
     } catch (error) {
       if (error.status === -1 || mine !== turn) return;
       shifts.replaceChildren(nothing(`The server says: ${error.message}`));
@@ -233,10 +251,15 @@ export function open(app, { machine: asked }) {
         csv,
       ),
     ),
+    zoneSaid,
     el("section", {}, el("h2", {}, "OEE, by ISO 22400-2"), shifts),
     el("section", {}, el("h2", {}, "Stops by reason"), key(), stops),
     el("section", {}, el("h2", {}, "Parts"), el("p", {}, partsCsv), made),
   );
   load();
-  return { title: "Production figures", element, keys: [[["l"], "load anew", load]], update: names, close: () => stop.abort() };
+  const update = () => {
+    names();
+    if (hasOtherClock() !== isOtherClock) load();
+  };
+  return { title: "Production figures", element, keys: [[["l"], "reload", load]], update, close: () => stop.abort() };
 }

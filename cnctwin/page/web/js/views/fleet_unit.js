@@ -3,7 +3,7 @@
 import { sparkline } from "../chart.js";
 import { el, setClass, setData, setHidden, setSymbol, setText, setTitle, symbol } from "../dom.js";
 import { Ring, Steps } from "../ring.js";
-import { coarse, execution, fixed, moment, number, plain, signed } from "../text.js";
+import { REPEATABILITY, REPEATABILITY_MEANS, coarse, execution, fixed, moment, number, plain, signed } from "../text.js";
 import {
   ADJUSTED_SCORE,
   ALERT_STATE,
@@ -29,6 +29,14 @@ function gapOf(machine) {
   }
   const given = machine.gap && typeof machine.gap === "object" ? (machine.gap.value ?? null) : (machine.gap ?? null);
   return worst ?? (typeof given === "number" ? given : null);
+}
+
+/** Why there is no standing gap: as its processor says it now, else as `/machines` does. */
+function whyNoGap(machine) {
+  for (const [signal, held] of machine.values)
+    if (signal.startsWith(GAP_PREFIX) && held.value === null && held.reason && !held.reason.endsWith("is not offered"))
+      return held.reason;
+  return machine.gapReason ?? "not known yet";
 }
 
 export class Unit {
@@ -111,14 +119,14 @@ export class Unit {
     const rest = gap === null ? m.bare(SPINDLE_TEMP_RESIDUAL_K) : null,
       hasRest = typeof rest === "number";
     setText(this.gap, gap !== null ? coarse(gap) : hasRest ? signed(rest, "K") : "–");
-    setText(this.gapUnit, gap !== null ? "× noise" : hasRest ? "K now" : "");
+    setText(this.gapUnit, gap !== null ? REPEATABILITY : hasRest ? "K now" : "");
     setTitle(
       this.gap,
       gap !== null
-        ? "the largest gap between machine and twin that stays, as a multiple of its noise: of what the same signal differs by from part to part. Below 3 it is hardly more than noise."
+        ? `the largest gap between machine and twin that stays, as a multiple of the ${REPEATABILITY_MEANS}. Below 3 it is hardly more than chance.`
         : hasRest
-          ? "spindle temperature, measured minus twin, at this moment; the standing gap is not known yet"
-          : "not known yet: the twin has not seen enough of this machine",
+          ? `spindle temperature, measured minus twin, at this moment; of the standing gap: ${whyNoGap(m)}`
+          : whyNoGap(m),
     );
     setClass(this.gap, "large", gap !== null && gap > 3);
     setClass(this.growing, "off", !growing);

@@ -2,7 +2,19 @@
 
 import { get, part } from "../api.js";
 import { el, say, setText, symbol } from "../dom.js";
-import { age, coarse, moment, number, plain, signed, title } from "../text.js";
+import {
+  REPEATABILITY,
+  REPEATABILITY_MEANS,
+  age,
+  between,
+  coarse,
+  moment,
+  number,
+  plain,
+  sentence,
+  signed,
+  title,
+} from "../text.js";
 import { serverNow } from "../clock.js";
 import { TILES, tileOf } from "../charted.js";
 import { diagnosisSections } from "./diagnosis.js";
@@ -122,7 +134,7 @@ function standing(gap) {
     el(
       "div",
       { class: "legend" },
-      el("span", {}, "rms of twin − measured, in floors (what a healthy machine differs by from itself); inferred"),
+      el("span", {}, `rms of twin − measured, ${REPEATABILITY}; inferred. ${sentence(REPEATABILITY_MEANS)}.`),
       el(
         "span",
         { class: "scale", "aria-hidden": "true" },
@@ -202,15 +214,11 @@ function nowOf(machine) {
       const own = machine.value(shown.own),
         twin = machine.value(shown.twin),
         rest = shown.residual ? machine.value(shown.residual) : null;
-      const between =
-        typeof rest?.value === "number"
-          ? rest.value
-          : typeof own?.value === "number" && typeof twin?.value === "number"
-            ? own.value - twin.value
-            : null;
+      const both = typeof own?.value === "number" && typeof twin?.value === "number",
+        published = typeof rest?.value === "number" ? `${signed(rest.value, rest.unit)} ${rest.unit ?? ""}` : "not known";
       texts.push([
         `${tile.name}: measured ${number(own?.value, own?.unit)}, twin ${number(twin?.value, twin?.unit)} ${own?.unit ?? ""}: `,
-        between === null ? "not known" : `${signed(between, rest?.unit ?? own?.unit)} ${rest?.unit ?? own?.unit ?? ""}`,
+        both ? between(own, twin) : published,
         own?.quality === "stale" ? ` (stale since ${moment(own.t)})` : "",
       ]);
     }
@@ -315,8 +323,8 @@ export function open(app, { machine: named }) {
     machine: name,
     stream: `stream?machine=${part(name)}`,
     keys: [
-      [["o"], "open the report", () => body.querySelector("a.report")?.click()],
-      [["l"], "load anew", load],
+      [["v"], "open the report", () => body.querySelector("a.report")?.click()],
+      [["l"], "reload", load],
       [["d"], "diagnose", () => loop.press("diagnose")],
       [["P"], "promote the challenger", () => loop.press("promote")],
     ],

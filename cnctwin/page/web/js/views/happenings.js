@@ -24,7 +24,7 @@ export class Happenings {
     this.seek = seek;
     this.events = [];
     this.descriptions = [];
-    this.element = el("div");
+    this.element = el("div", {}, el("p", { class: "waiting" }, "Loading …"));
   }
 
   async load(past, from, to, signal) {

@@ -1,7 +1,7 @@
 // The head of all views of one machine: which one, its state, program, tool, gate and alert.
 
 import { el, setClass, setHidden, setSymbol, setText, symbol } from "../dom.js";
-import { age, execution, moment } from "../text.js";
+import { SUPPRESSION_MEANS, age, execution, moment } from "../text.js";
 import { serverNow } from "../clock.js";
 import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
@@ -17,7 +17,7 @@ export function machineHead(app, machine, viewName, ...after) {
     state = el("span", { class: "chip state" }, sign, word);
   const job = el("span", { class: "job" }),
     block = el("code", { class: "nc" }),
-    gate = el("span", { class: "chip gate", hidden: true }, "tool change");
+    gate = el("span", { class: "chip gate", hidden: true, title: SUPPRESSION_MEANS }, "tool change");
   const alertSign = symbol("s-alert"),
     alertWord = el("span"),
     alert = el("a", { class: "chip medium", href: app.address("alerts"), hidden: true }, alertSign, alertWord);

@@ -1,16 +1,16 @@
-// A moment of the past: state, program, tool, gate, figures, and the description that was live.
+// A moment of the past: state, program, tool, suppression window, figures, and the description that was live.
 
 import { SCORES, valueAt } from "../charted.js";
 import { el, setText } from "../dom.js";
-import { execution, number, plain } from "../text.js";
+import { SUPPRESSION_MEANS, execution, number, plain } from "../text.js";
 import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 export class MomentShown {
   constructor() {
     this.parts = {};
-    const named = (key, term, wide = "") => {
+    const named = (key, term, wide = "", about = null) => {
       this.parts[key] = el("dd");
-      return el("div", { class: wide }, el("dt", {}, term), this.parts[key]);
+      return el("div", { class: wide, title: about }, el("dt", {}, term), this.parts[key]);
     };
     this.element = el(
       "dl",
@@ -20,7 +20,7 @@ export class MomentShown {
       named("tool_number", "Tool"),
       named("nc_line", "Line"),
       named("nc_block", "Block", "wide"),
-      named("gate", "Gate"),
+      named("gate", "Suppression window", "", SUPPRESSION_MEANS),
       named("spindle_rpm", "Speed"),
       named("spindle_load_pct", "Load"),
       named("feed_mm_min", "Feed"),
@@ -44,7 +44,7 @@ export class MomentShown {
     put("tool_number", at("tool_number") === null ? null : `T${at("tool_number")}`);
     put("nc_line", at("nc_line") === null ? null : plain(at("nc_line")));
     put("nc_block", at("nc_block"));
-    put("gate", at(TOOL_CHANGE_GATE) === null ? null : at(TOOL_CHANGE_GATE) ? "closed" : "open");
+    put("gate", at(TOOL_CHANGE_GATE) === null ? null : at(TOOL_CHANGE_GATE) ? "yes" : "no");
     put("spindle_rpm", unit("spindle_rpm", "rev/min"));
     put("spindle_load_pct", unit("spindle_load_pct", "%"));
     put("feed_mm_min", unit("feed_mm_min", "mm/min"));

@@ -1,11 +1,11 @@
 // Proof: the nightly comparison with ground truth, and the as-built record of each part.
 
-import { get, part } from "../api.js";
+import { get, part, query } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openDocument } from "../dialogs.js";
 import { columnHead, el, symbol } from "../dom.js";
 import { lookup } from "../lookup.js";
-import { age, coarse, duration, moment, number, plain, words } from "../text.js";
+import { REPEATABILITY, age, coarse, duration, moment, number, plain, words } from "../text.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 
@@ -159,7 +159,7 @@ function parts(found) {
         el(
           "tr",
           {},
-          ["Made", "Program", "Part", "Cycle", "Tools", "Hottest", "Force, largest", "Gap, × noise", "How it ended", ""].map(
+          ["Made", "Program", "Part", "Cycle", "Tools", "Hottest", "Force, largest", `Gap, ${REPEATABILITY}`, "How it ended", ""].map(
             (text, i) => columnHead(text, [2, 3, 5, 6, 7].includes(i)),
           ),
         ),
@@ -175,7 +175,9 @@ export function open(app, { machine: named }) {
     return noMachine(app, "Parts and validation", "Parts are made by a machine, and its twin is validated; there is none so far.");
   const element = el("div", { class: "view validation-view" }),
     stop = new AbortController(),
-    head = machineHead(app, app.plant.machine(name), "parts");
+    machine = app.plant.machine(name),
+    head = machineHead(app, machine, "parts");
+  let isOtherClock = null;
   const made = el("div", {}, el("p", { class: "waiting" }, "Loading …")),
     proof = el("div", {}, el("p", { class: "waiting" }, "Loading …"));
   element.append(
@@ -193,7 +195,9 @@ export function open(app, { machine: named }) {
           host.replaceChildren(...[show({ reason: `The server says: ${error.message}` })].flat().filter(Boolean));
       }
     };
-    await Promise.all([into(`parts/${part(name)}`, made, parts), into(`validation/${part(name)}`, proof, figures)]);
+    isOtherClock = machine.otherClock;
+    const made_ = query(`parts/${part(name)}`, { to: isOtherClock ? Math.ceil(machine.now()) + 1 : null });
+    await Promise.all([into(made_, made, parts), into(`validation/${part(name)}`, proof, figures)]);
   };
   load();
   const tick = setInterval(head.write, 1000);
@@ -202,8 +206,11 @@ export function open(app, { machine: named }) {
     element,
     machine: name,
     stream: `stream?machine=${part(name)}`,
-    keys: [[["l"], "load anew", load]],
-    update: head.write,
+    keys: [[["l"], "reload", load]],
+    update() {
+      head.write();
+      if (machine.otherClock !== isOtherClock) load();
+    },
     close() {
       stop.abort();
       clearInterval(tick);

@@ -3,11 +3,11 @@
 
 import { get, part } from "../api.js";
 import { TILES, chartOf, firstOf, tileOf } from "../charted.js";
-import { serverNow } from "../clock.js";
 import { el, say, setHidden, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
 import { Panels } from "../panels.js";
 import { columnsOf, livedThrough } from "../past.js";
+import { Machine } from "../plant.js";
 import { Ring } from "../ring.js";
 import { duration, fromLocalField, localField, moment, title } from "../text.js";
 import { Happenings } from "./happenings.js";
@@ -25,7 +25,8 @@ export function open(app, { machine: named, search }) {
   const name = app.pick(named);
   if (name === null) return noMachine(app, "Replay", "What is replayed is the past of a machine; there is none so far.");
   const element = el("div", { class: "view replay-view" }),
-    known = app.plant.machine(name),
+    live = app.plant.machine(name),
+    known = new Machine(name), // what it has now, for this view alone: nothing of a replay gets into what is shown as live
     stop = new AbortController();
   let past = null,
     panels = null,
@@ -72,10 +73,7 @@ export function open(app, { machine: named, search }) {
               type: "button",
               class: "button",
               "aria-label": `the last ${word}`,
-              onclick: () => {
-                const now = Math.round(known.now());
-                load(now - ms, now);
-              },
+              onclick: () => load(null, null, ms),
             },
             word,
           ),
@@ -134,7 +132,7 @@ export function open(app, { machine: named, search }) {
     el(
       "section",
       {},
-      el("h2", {}, "The same again?"),
+      el("h2", {}, "Recompute"),
       el(
         "p",
         { class: "note" },
@@ -150,15 +148,30 @@ export function open(app, { machine: named, search }) {
     select.value = name;
   }
 
-  async function load(start, finish) {
-    [start, finish] = [Math.floor(start), Math.ceil(finish)];
-    if (!(finish > start)) {
-      tell("The end has to be after the beginning.");
-      return;
-    }
+  /** The end of "the last minutes": now, or the newest value where it is old. */
+  const newest = () => Math.round(known.now() - known.lastT > LATELY[0][0] && known.lastT > 0 ? known.lastT : known.now());
+
+  async function know() {
+    const state = await get(`state/${part(name)}`, { signal: stop.signal }).catch(() => null);
+    if (!state) return;
+    known.state(state);
+    if (live.otherClock) [known.otherClock, known.lastHeard] = [true, performance.now()];
+  }
+
+  /** Loads a stretch; start and finish null: the last `lately` ms. */
+  async function load(start, finish, lately = LATELY[0][0]) {
     const number_ = ++asking;
     run(false);
     setText(what, "Loading …");
+    await know();
+    if (number_ !== asking || stop.signal.aborted) return;
+    finish = Math.ceil(finish ?? newest());
+    start = Math.floor(start ?? finish - lately);
+    if (!(finish > start)) {
+      setText(what, "");
+      tell("The end has to be after the beginning.");
+      return;
+    }
     begin.value = localField(start);
     end.value = localField(finish);
     history.replaceState(
@@ -168,10 +181,7 @@ export function open(app, { machine: named, search }) {
     );
     app.replaceShown?.(location.hash);
     try {
-      const state = await get(`state/${part(name)}`, { signal: stop.signal }).catch(() => null);
-      if (state) app.plant.state(state);
       const found = await columnsOf(known, start, finish, signal, stop.signal);
-
       if (number_ !== asking) return;
       const lived = livedThrough(known, found.columns);
       [past, from, to] = [lived, start, finish];
@@ -277,8 +287,7 @@ export function open(app, { machine: named, search }) {
     if (past) seek(at + (step * (to - from)) / 200);
   };
   fields();
-  const now = Math.round(known.now() > 0 ? known.now() : serverNow());
-  load(from ?? now - LATELY[0][0], to ?? now);
+  load(from, to);
   return {
     title: `Replay of ${name}`,
     element,

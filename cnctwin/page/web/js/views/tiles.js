@@ -2,7 +2,7 @@
 
 import { tileOf, SCORES } from "../charted.js";
 import { el, setClass, setData, setHidden, setText, setTitle } from "../dom.js";
-import { age, fixed, moment, number, rounded, signed } from "../text.js";
+import { age, between, fixed, moment, number, signed } from "../text.js";
 import { COMMON_MODE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 const OLD_MS = 10000;
@@ -137,8 +137,7 @@ export class Tile {
     }
     setHidden(this.rest.element, !both);
     if (!both) return;
-    const unit = held.unit === "°C" ? "K" : (held.unit ?? "");
-    setText(this.rest.figure, `${signed(rounded(held.value, held.unit) - rounded(twin.value, held.unit), held.unit)} ${unit}`);
+    setText(this.rest.figure, between(held, twin));
     setText(this.rest.more, "");
     setData(this.rest.word, "from", "inferred");
     setClass(this.rest.figure, "old", twin.quality !== "good" || held.quality !== "good");
@@ -185,7 +184,7 @@ export class ScoreTile {
         : held.quality === "stale" || !machine.online
           ? agedText(machine, held)
           : gated
-            ? "gated: not judged"
+            ? "not judged: suppression window"
             : isCommon
               ? "the peers explain it"
               : agedText(machine, held),

@@ -138,7 +138,7 @@ export function twinLoop(app, name, changed = () => {}) {
     setHidden(back, !canGoBack());
     promote.disabled = !allowed || !mayPromote;
     for (const one of [diagnose, withdraw, back]) one.disabled = !allowed;
-    const told = !allowed ? whyNot("operator", "deciding about the twin") : challenger && !mayPromote ? sentence(why) : "";
+    const told = !allowed ? whyNot("operator", "deciding about the twin") : challenger && !mayPromote ? inWords(why) : "";
     setText(note, told);
     setHidden(note, !told);
   }
@@ -148,12 +148,12 @@ export function twinLoop(app, name, changed = () => {}) {
   /** The figures that move: the time that a step takes, and the standing gap as the stream tells it. */
   function write() {
     if (loop === null) return;
-    setText(since, Number.isFinite(loop.since) ? `for ${age(serverNow() - loop.since)}` : "");
+    setText(since, loop.since > 0 ? `for ${age(serverNow() - loop.since)}` : "");
     const standing = {};
     for (const [signal, one] of Object.entries(loop.standing ?? {})) {
       standing[signal] = {
-        live: floors(machine.value(GAP_PREFIX + signal)) ?? one.live,
-        challenger: floors(machine.value(CHALLENGER_PREFIX + GAP_PREFIX.slice(TWIN_PREFIX.length) + signal)) ?? one.challenger,
+        live: known(machine.value(GAP_PREFIX + signal)) ?? one.live,
+        challenger: known(machine.value(CHALLENGER_PREFIX + GAP_PREFIX.slice(TWIN_PREFIX.length) + signal)) ?? one.challenger,
       };
     }
     gaps.show({ standing, challenged: Boolean(loop.challenger) });
@@ -173,7 +173,7 @@ export function twinLoop(app, name, changed = () => {}) {
 
   function askPromote() {
     const about = [
-      el("p", {}, sentence(loop.challenger.sentence)),
+      el("p", {}, inWords(loop.challenger.sentence)),
       el("p", {}, `From then on this is the live twin of ${name}, in every figure and every job. Back undoes it.`),
     ];
     openAsked(`Promote the challenger of ${name}`, about, "Promote", () => ordered("promote", loop.challenger.version));
@@ -212,14 +212,14 @@ export function twinLoop(app, name, changed = () => {}) {
   };
 }
 
-const floors = (value) => (typeof value?.value === "number" && value.quality === "good" ? value.value : null);
+const known = (value) => (typeof value?.value === "number" && value.quality === "good" ? value.value : null);
 
 /** What the last promotion did to the gap. */
 function closed(one) {
   return el(
     "p",
     { class: "closed" },
-    el("strong", {}, sentence(one.text)),
-    Number.isFinite(one.since) ? el("span", { class: "quiet" }, ` since ${moment(one.since)}`) : null,
+    el("strong", {}, inWords(one.text)),
+    one.since > 0 ? el("span", { class: "quiet" }, ` since ${moment(one.since)}`) : null,
   );
 }

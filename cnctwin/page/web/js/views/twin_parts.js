@@ -2,7 +2,7 @@
 
 import { el, symbol, table } from "../dom.js";
 import { lookup } from "../lookup.js";
-import { coarse, moment, number, recorded, sentence, share, title, words } from "../text.js";
+import { REPEATABILITY, REPEATABILITY_MEANS, coarse, inPageWords, moment, number, recorded, sentence, share, title, words } from "../text.js";
 
 const STEPS = [
   ["watching", "Watch", "twin and machine are compared all the time"],
@@ -19,8 +19,8 @@ const VERDICTS = lookup({
 });
 const DEEDS = lookup({ promote: "Promoted", back: "Went back", challenge: "Challenger", withdraw: "Withdrawn", edit: "Edited" });
 const HISTORY_MAX = 50;
-const FULL_FLOORS_MIN = 3;
-const CLOSED_FLOORS_MAX = 1.3;
+const FULL_MIN = 3; // × repeatability, as all gaps here
+const CLOSED_MAX = 1.3;
 
 const list = (value) => (Array.isArray(value) ? value : []);
 
@@ -33,7 +33,10 @@ export const parameter = (name) =>
   words(name.replace(/_(s|n|k|kw|mm|rpm_s|rpm|w_per_k|j_per_k)$/, "")).toLowerCase();
 
 /** A sentence of the loop; a version that it begins with stays as it is. */
-export const told = (text) => (/^[0-9a-f]{12} /.test(text ?? "") ? text : sentence(text));
+export const told = (text) => {
+  const said = inPageWords(text);
+  return /^[0-9a-f]{12} /.test(said) ? said : sentence(said);
+};
 
 /** Where the loop stands: one of five steps, or refused. */
 export function steps(loop) {
@@ -61,13 +64,13 @@ export function answer(found) {
   const causes = list(found.causes),
     unit = (one) => (one.unit && one.unit !== "unit of the signal" ? ` ${one.unit}` : "");
   const gaps = [found.gap_before, found.gap_after].every(Number.isFinite)
-    ? `gap ${coarse(found.gap_before)} → ${coarse(found.gap_after)} floors, on a stretch that it was not fitted to`
+    ? `gap ${coarse(found.gap_before)} → ${coarse(found.gap_after)} ${REPEATABILITY}, on a stretch that it was not fitted to`
     : "";
   return el(
     "div",
     { class: "answer" },
     el("h3", {}, "The answer"),
-    el("p", { class: "sentence" }, sentence(found.sentence)),
+    el("p", { class: "sentence" }, told(found.sentence)),
     el("p", { class: "quiet" }, [VERDICTS[found.verdict] ?? words(found.verdict), gaps].filter(Boolean).join(" · ")),
     causes.map((one) =>
       el(
@@ -100,24 +103,24 @@ export function answer(found) {
 function bar(kind, word, value, full) {
   const known = Number.isFinite(value),
     width = known ? Math.min(100, (100 * value) / full) : 0;
-  const fill = el("span", { class: `fill ${kind}`, "data-closed": known && value <= CLOSED_FLOORS_MAX });
+  const fill = el("span", { class: `fill ${kind}`, "data-closed": known && value <= CLOSED_MAX });
   fill.style.width = `${width.toFixed(1)}%`;
-  const floor = el("span", { class: "floor" });
-  floor.style.left = `${(100 / full).toFixed(1)}%`;
+  const repeatability = el("span", { class: "one" });
+  repeatability.style.left = `${(100 / full).toFixed(1)}%`;
   return el(
     "div",
     { class: "gapbar" },
     el("span", { class: "what" }, word),
-    el("span", { class: "rail", "aria-hidden": "true" }, fill, floor),
+    el("span", { class: "rail", "aria-hidden": "true" }, fill, repeatability),
     el("span", { class: "figure" }, known ? coarse(value) : "–"),
   );
 }
 
-/** The standing gap by signal, live and of the challenger. standing: signal → {live, challenger}, in floors. */
+/** The standing gap by signal, live and of the challenger. standing: signal → {live, challenger}, as multiples of the repeatability. */
 export function bars(standing, hasChallenger) {
   const rows = Object.entries(standing).filter(([, one]) => Number.isFinite(one.live) || Number.isFinite(one.challenger));
   if (!rows.length) return el("p", { class: "quiet" }, "No standing gap yet: it is worked out over the first minute of production.");
-  const full = Math.max(FULL_FLOORS_MIN, ...rows.flatMap(([, one]) => [one.live ?? 0, one.challenger ?? 0])) * 1.05;
+  const full = Math.max(FULL_MIN, ...rows.flatMap(([, one]) => [one.live ?? 0, one.challenger ?? 0])) * 1.05;
   return el(
     "div",
     { class: "gapbars" },
@@ -130,7 +133,7 @@ export function bars(standing, hasChallenger) {
         hasChallenger ? bar("challenger", "challenger", one.challenger, full) : null,
       ),
     ),
-    el("p", { class: "note" }, "Standing gap in floors, which a healthy machine differs by from itself; the line is at one floor."),
+    el("p", { class: "note" }, `Standing gap, ${REPEATABILITY}; the line is at 1. ${sentence(REPEATABILITY_MEANS)}.`),
   );
 }
 
@@ -138,14 +141,14 @@ export function bars(standing, hasChallenger) {
 export function score(found) {
   if (!found) return null;
   const runs = found.runs === 1 ? "one kept run" : `${found.runs} kept runs`;
-  return el("p", { class: "note" }, `On ${runs}: live ${coarse(found.live)}, challenger ${coarse(found.challenger)} floors.`);
+  return el("p", { class: "note" }, `On ${runs}: live ${coarse(found.live)}, challenger ${coarse(found.challenger)} ${REPEATABILITY}.`);
 }
 
 /** Every step that was taken, the newest first. */
 export function history(taken) {
   if (!list(taken).length) return null;
   const gap = (one) =>
-    Number.isFinite(one.before) && Number.isFinite(one.after) ? `${coarse(one.before)} → ${coarse(one.after)} floors` : "";
+    Number.isFinite(one.before) && Number.isFinite(one.after) ? `${coarse(one.before)} → ${coarse(one.after)} ${REPEATABILITY}` : "";
   const rows = list(taken)
     .slice(-HISTORY_MAX)
     .reverse()
@@ -153,7 +156,7 @@ export function history(taken) {
       moment(one.t),
       DEEDS[one.step] ?? words(one.step),
       String(one.by ?? ""),
-      String(one.why ?? ""),
+      inPageWords(one.why),
       gap(one),
       el("code", {}, String(one.version ?? "").slice(0, 12)),
     ]);
