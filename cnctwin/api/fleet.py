@@ -1,6 +1,6 @@
 """A machine in short: what an overview of fifty of them shows."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from cnctwin.api.value_object import Plain, plain
@@ -46,9 +46,14 @@ def fleet_item(machine: str, online: bool, signals: Mapping[str, SignalReading])
         value for name, told in signals.items() if twin_signals.is_gap(name) and isinstance(value := _known(told.reading), float)
     ]
     item["gap"] = max(gaps, default=None)
-    measured = (told.reading.timestamp_ms for name, told in signals.items() if not name.startswith(twin_signals.TWIN_PREFIX))
-    item["last_t"] = max(measured, default=None)
+    measured = [told.reading for name, told in signals.items() if not name.startswith(twin_signals.TWIN_PREFIX)]
+    item["last_t"] = newest_ms(measured)
     return item
+
+
+def newest_ms(readings: Iterable[Reading]) -> int | None:
+    """Return the machine's own time by now: the newest stamp of a value, since nulls may be stamped by another clock."""
+    return max((reading.timestamp_ms for reading in readings if reading.quality is not Quality.BAD), default=None)
 
 
 def _known(reading: Reading) -> Plain:

@@ -1,13 +1,14 @@
 """One native text, one canonical value."""
 
 import math
+import struct
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import ConfigError
-from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value
+from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value, shortest_of_float32
 from edge.signals import signal
 from edge.units import conversion
 from sparkplug.quality import Quality
@@ -142,3 +143,17 @@ def test_any_typed_value_gives_a_value_of_the_right_type_or_a_null_with_a_reason
 def test_a_name_that_is_not_canonical_is_refused() -> None:
     with pytest.raises(ConfigError, match="'spindle_speed' is no canonical name"):
         signal("spindle_speed")
+
+
+@pytest.mark.parametrize(
+    ("native", "factor", "told"), [(3.0, 0.1, 0.3), (1.06215333333333, 60.0, 63.7292), (0.1 + 0.2, 1.0, 0.1 + 0.2)]
+)
+def test_what_a_conversion_adds_of_binary_noise_is_not_published(native: float, factor: float, told: float) -> None:
+    assert read_value(Target("x", "plc_pressure", factor), native)[0] == told
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_a_value_of_32_bits_becomes_a_short_decimal_that_is_still_the_same_value(native: float) -> None:
+    short = shortest_of_float32(native)
+    assert struct.pack("<f", short) == struct.pack("<f", native)
+    assert len(repr(short).replace("-", "").partition("e")[0].replace(".", "").strip("0")) <= 9

@@ -13,7 +13,7 @@ from edge.controls.mtconnect.check import describe
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import error_document
 from edge.controls.mtconnect.cursor import next_request
-from edge.controls.mtconnect.documents import AssetsDocument, parse_document
+from edge.controls.mtconnect.documents import AssetsDocument, parse_document, timestamp_ms
 from edge.controls.mtconnect.state import Cursor, Phase
 from edge.controls.mtconnect.tool_asset import Life, ToolAsset
 from edge.errors import ConfigError
@@ -38,6 +38,11 @@ def asset(asset_id: str, minutes: str = "12") -> bytes:
         f'{minutes}</ToolLife><Measurements><FunctionalLength units="INCH">5</FunctionalLength></Measurements>'
         "</CuttingToolLifeCycle></CuttingTool></Assets></MTConnectAssets>"
     ).encode()
+
+
+def changed_asset(sequence: int, asset_id: str, time: str) -> str:
+    """Return the observation as an agent sends it: the element says that it is of an asset."""
+    return value("ac", sequence, asset_id, time=time, element="AssetChanged")
 
 
 def loaded(tool: str = "7.1") -> Cursor:
@@ -99,11 +104,22 @@ def test_the_agent_is_asked_for_the_tool_and_sampling_goes_on_where_it_was() -> 
 def test_an_asset_that_changes_often_is_asked_for_every_ten_seconds_at_most() -> None:
     cursor, _ = fed(asset("7.1"), cursor=loaded())
     for second, phase in ((6, Phase.SAMPLE), (9, Phase.SAMPLE), (16, Phase.ASSET)):
-        changed = value("ac", 10 + second, "7.1", time=f"2026-01-01T00:00:{second:02d}Z")
-        cursor, _ = fed(streams(11 + second, [changed]), cursor=cursor)
+        goes_on = value("msg", 10 + 2 * second, "on", time=f"2026-01-01T00:00:{second:02d}Z")
+        changed = changed_asset(11 + 2 * second, "7.1", time="2031-06-01T00:00:00Z")  # the agent's clock, which dates nothing
+        cursor, _ = fed(streams(12 + 2 * second, [goes_on, changed]), cursor=cursor)
         assert cursor.phase is phase
     other, _ = fed(streams(60, [value("ac", 50, "8.1", time="2026-01-01T01:00:00Z")]), cursor=fed(asset("7.1"), cursor=cursor)[0])
     assert other.phase is Phase.SAMPLE  # the asset of a tool in the magazine
+
+
+@pytest.mark.parametrize("days", ["2031-06-01", "2019-06-01"])
+def test_the_tool_is_dated_by_the_machine_and_not_by_the_clock_of_the_agent_or_the_day_of_its_measurement(days: str) -> None:
+    cut = value("msg", 6, "cut", time="2026-01-01T00:00:07Z")
+    lost = value("avail", 7, "UNAVAILABLE", time=f"{days}T00:00:00Z")
+    found = [value("ta", 5, "7.1", time="2026-01-01T00:00:05Z"), cut, lost, changed_asset(8, "7.1", time=f"{days}T00:00:00Z")]
+    cursor, frame = fed(with_tool(), streams(10, found))
+    stamps = {one.timestamp_ms for one in fed(asset("7.1"), cursor=cursor)[1].samples}
+    assert stamps == {frame.newest_ms} == {timestamp_ms("2026-01-01T00:00:07Z")}
 
 
 @pytest.mark.parametrize(("told", "why"), [("", "no tool in the spindle"), ("UNAVAILABLE", "unavailable")])
