@@ -10,7 +10,8 @@ from urllib.parse import parse_qsl
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig, one_line
+from edge.config import EdgeConfig
+from edge.config_fault import one_line
 from edge.controls.opcua.alarm_samples import Heard
 from edge.controls.opcua.check import alarm_rows, read_all, read_events, run
 from edge.controls.opcua.config import Config, OpcUaConfig
