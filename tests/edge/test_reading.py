@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from edge.errors import ConfigError
 from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value, shortest_of_float32
 from edge.signals import signal
-from edge.units import conversion
+from edge.units import between, conversion
 from sparkplug.quality import Quality
 from twin.vocabulary.signals import SIGNALS
 
@@ -116,6 +116,34 @@ def test_units_are_converted(native: str, canonical: str, value: float, expected
 def test_a_unit_that_is_not_known_is_refused_with_those_that_are() -> None:
     with pytest.raises(ConfigError, match="native unit 'FURLONG' cannot become mm; it may be MILLIMETER, INCH"):
         conversion("FURLONG", "mm")
+
+
+@pytest.mark.parametrize(
+    ("native", "wanted", "value", "expected"),
+    [
+        ("MILLIMETER/SECOND", "mm/min", 2, 120),
+        ("m/min", "mm/min", 1.5, 1500),
+        ("INCH", "mm", 2, 50.8),
+        ("psi", "bar", 145.0377377, 10),
+        ("°F", "°C", 212, 100),
+        ("CELSIUS", "°F", 100, 212),
+        ("WATT", "kW", 1500, 1.5),
+        ("1/min", "rev/s", 120, 2),
+        ("", "mm", 3, 3),
+        ("mm", "", 3, 3),
+        ("strokes", "strokes", 3, 3),
+        ("strokes", "bar", 3, 3),  # it is not known, so nobody can say that it is wrong
+    ],
+)
+def test_what_a_control_states_becomes_the_unit_that_a_configuration_wants(
+    native: str, wanted: str, value: float, expected: float
+) -> None:
+    assert between(native, wanted).apply(value) == pytest.approx(expected)
+
+
+def test_a_unit_of_another_quantity_is_refused_with_both() -> None:
+    with pytest.raises(ConfigError, match="MILLIMETER is a length and bar a pressure"):
+        between("MILLIMETER", "bar")
 
 
 @given(st.sampled_from(sorted(SIGNALS)), st.text(max_size=40) | st.floats().map(repr))

@@ -191,3 +191,18 @@ def test_check_shows_the_tool_of_an_agent_and_a_wrong_address_is_one_line(tmp_pa
         with pytest.raises(ConfigError) as caught:
             describe(parse_file(text.format(agent.url, "Lp1CommonVariabel"), tmp_path / "e.toml"))
     assert "variables.x.address = 'Lp1CommonVariabel': device 'OKUMA' has no such item with values; near are" in str(caught.value)
+
+
+def test_a_unit_that_the_agent_declares_is_converted_or_refused_in_one_line() -> None:
+    def with_unit(unit: str) -> EdgeConfig[MtconnectConfig]:
+        chosen = TypeAdapter(Variables).validate_python({"speed": {"address": "rpm", "unit": unit}})
+        return EdgeConfig(source=MtconnectConfig(), variables=chosen)
+
+    config = with_unit("rev/s")
+    _, frame = fed(with_tool(), streams(6, [value("rpm", 5, "900")]), config=config)
+    assert dict(values(frame))["variable_speed"] == 15.0
+    _, frame = fed(with_tool(), config=with_unit("bar"))
+    assert frame.error == (
+        "variables.speed.unit = 'bar': the control says otherwise: REVOLUTION/MINUTE is a speed of rotation and bar a pressure; "
+        "correct it, or add a scale"
+    )
