@@ -114,15 +114,13 @@ def _text(known: Signal, text: str) -> Outcome:
     return (word, Quality.GOOD, None) if word in known.words else bad(f"no word of the vocabulary: {text[:80]!r}")
 
 
-def _converted(native: float, target: Target) -> float:
-    """Return the canonical value; one that was computed has 12 digits, beyond which there is only the noise of binary fractions.
+def without_noise(computed: float) -> float:
+    """Return 12 digits of a value that was computed, beyond which there is only the noise of binary fractions.
 
-    >>> _converted(3.0, Target("D300", "plc_pressure", 0.1)), 3.0 * 0.1
+    >>> without_noise(3.0 * 0.1), 3.0 * 0.1
     (0.3, 0.30000000000000004)
     """
-    if target.factor == 1.0 and not target.offset:
-        return native
-    return float(f"{native * target.factor + target.offset:.12g}")
+    return float(f"{computed:.12g}")
 
 
 def shortest_of_float32(value: float) -> float:
@@ -144,7 +142,8 @@ def _figure(target: Target, known: Signal, native: float) -> Outcome:
     if known.kind is Kind.INTEGER:
         whole = native == int(native) and abs(native) < 2**63
         return (int(native), Quality.GOOD, None) if whole else bad(f"not a whole number: {native:g}")
-    value = _converted(native, target)
+    is_as_it_was = target.factor == 1.0 and not target.offset
+    value = native if is_as_it_was else without_noise(native * target.factor + target.offset)
     if target.low is None or target.high is None or target.low <= value <= target.high:
         return value, Quality.GOOD, None
     return bad(replace(known, low=target.low, high=target.high).plausible(value) or "")

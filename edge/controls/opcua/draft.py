@@ -19,7 +19,7 @@ from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.library import require
 from edge.controls.opcua.point import maps
 from edge.errors import ConfigError, ConnectionLostError
-from edge.sample import SampleSet
+from edge.sample import EMPTY, SampleSet
 from edge.signals import signal
 from edge.sweep import Sweep
 from edge.units import conversion
@@ -173,7 +173,7 @@ def _signals(found: SampleSet, units: dict[str, str]) -> list[str]:
             lines += [f"[signals.{offer.signal}]  # {offer.source}", f"native_unit = {_quoted(native)}"]
         else:
             unit = units.get(offer.signal, "")
-            lines.append(f"# {offer.signal}: {offer.source}{f' in {unit}' if unit else ''}, now {str(shown)[:60]!r}")
+            lines.append(f"# {offer.signal}: {offer.source}{f' in {unit}' if unit else ''}, now {str(shown)[:60] or EMPTY}")
     return lines
 
 
