@@ -60,7 +60,8 @@ def _shown(value: object) -> str:
     """Return the value behind its equals sign; nothing where it is a whole table, which is read in the file."""
     if isinstance(value, dict | list):
         return ""
-    return f" = {shown_address(repr(value)) if '//' in str(value) else repr(value)}"
+    is_address = any(mark in str(value) for mark in ("//", "?", "@"))  # of a broker or control; "#500" is a variable's
+    return f" = {shown_address(repr(value)) if is_address else repr(value)}"
 
 
 def _wrong(complaint: Any) -> str:
