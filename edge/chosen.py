@@ -16,9 +16,11 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from edge.errors import ConfigError
 from edge.reading import Target
 from edge.sample import Offer
 from edge.section import Section
+from edge.units import between
 from twin.vocabulary.signals import CHOSEN_NAME, PLC_PREFIX, VARIABLE_PREFIX, Kind
 
 CHOSEN_MAX = 200  # of each table
@@ -75,17 +77,28 @@ class Chosen(NamedTuple):
         prefix = PLC_PREFIX if self.is_plc else VARIABLE_PREFIX
         return f"{'plc' if self.is_plc else 'variables'}.{self.signal.removeprefix(prefix)}"
 
-    def target(self, fact: str) -> Target:
-        """Return how the value of this fact becomes the signal's.
+    def target(self, fact: str, native_unit: str = "") -> Target:
+        """Return how the value of this fact becomes the signal's; ConfigError where the control states a unit of another kind.
+
+        A scale says that the configuration knows better: then nothing is converted, and nothing refused.
 
         >>> Chosen("plc_pressure", "D300:2", "bar", 0.1).target("pmc.D300:2").factor
         0.1
+        >>> Chosen("plc_pressure", "p", "bar").target("p", "PASCAL").factor
+        1e-05
         """
-        return Target(fact, self.signal, self.scale, kind=self.kind)
+        if self.scale != 1.0 or self.kind is not Kind.NUMBER:
+            return Target(fact, self.signal, self.scale, kind=self.kind)
+        try:
+            way = between(native_unit, self.unit)
+        except ConfigError as error:
+            why = f"{self.table}.unit = {self.unit!r}: the control says otherwise: {error}; correct it, or add a scale"
+            raise ConfigError(why) from None
+        return Target(fact, self.signal, way.factor, way.offset, kind=self.kind)
 
-    def offer(self, source: str) -> Offer:
+    def offer(self, source: str, native_unit: str = "") -> Offer:
         """Return what the birth certificate says of it."""
-        return Offer(self.signal, source, unit=self.unit, kind=self.kind)
+        return Offer(self.signal, source, native_unit, unit=self.unit, kind=self.kind)
 
 
 def chosen_of(variables: Mapping[str, VariableSection], plc: Mapping[str, PlcSection]) -> tuple[Chosen, ...]:

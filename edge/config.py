@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Generic, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from edge.accelerometer.section import AccelerometerSection
 from edge.chosen import Chosen, PlcSection, VariableSection, chosen_of
@@ -16,7 +16,6 @@ from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import signal
 from edge.units import conversion
-from sparkplug.shown_address import shown_address
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
@@ -158,13 +157,3 @@ class EdgeConfig(Generic[SourceT]):
     def node(self) -> str:
         """The id of the edge node."""
         return self.broker.node or edge_node(self.machine.name)
-
-
-def one_line(path: Path, table: str, error: ValidationError) -> str:
-    """The first complaint of pydantic as file, key, value and what is wrong."""
-    first = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
-    if first["type"] == "extra_forbidden":
-        return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
-    shown = shown_address(repr(first["input"]))
-    return f"{path}: {key} = {shown}: {first['msg'].removeprefix('Value error, ')}"

@@ -17,8 +17,8 @@ from edge.config import (
     SignalSection,
     StoreSection,
     ToolChangeSection,
-    one_line,
 )
+from edge.config_fault import one_line
 from edge.errors import ConfigError
 
 _SECTIONS: dict[str, TypeAdapter[Any]] = {

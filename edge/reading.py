@@ -8,6 +8,7 @@
 
 import math
 import re
+import struct
 from dataclasses import dataclass, replace
 
 from edge.sample import EMPTY, UNAVAILABLE
@@ -16,6 +17,7 @@ from sparkplug.quality import Quality
 from twin.vocabulary.signals import Kind, Signal
 
 TEXT_LENGTH_MAX = 8192
+_FLOAT32 = struct.Struct("<f")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
 _FLAGS = {"ON": True, "ACTIVE": True, "OPEN": True, "TRUE": True, "1": True} | {
     "OFF": False,
@@ -112,13 +114,36 @@ def _text(known: Signal, text: str) -> Outcome:
     return (word, Quality.GOOD, None) if word in known.words else bad(f"no word of the vocabulary: {text[:80]!r}")
 
 
+def without_noise(computed: float) -> float:
+    """Return 12 digits of a value that was computed, beyond which there is only the noise of binary fractions.
+
+    >>> without_noise(3.0 * 0.1), 3.0 * 0.1
+    (0.3, 0.30000000000000004)
+    """
+    return float(f"{computed:.12g}")
+
+
+def shortest_of_float32(value: float) -> float:
+    """Return the shortest decimal that is the same value in 32 bits, which is what the control's own screen shows.
+
+    >>> shortest_of_float32(12.300000190734863)
+    12.3
+    """
+    for digits in range(6, 10):
+        short = float(f"{value:.{digits}g}")
+        if _FLOAT32.unpack(_FLOAT32.pack(short))[0] == value:
+            return short
+    return value
+
+
 def _figure(target: Target, known: Signal, native: float) -> Outcome:
     if abs(native) > 1e300:
         return bad(f"not a finite number: {native:g}")
     if known.kind is Kind.INTEGER:
         whole = native == int(native) and abs(native) < 2**63
         return (int(native), Quality.GOOD, None) if whole else bad(f"not a whole number: {native:g}")
-    value = native * target.factor + target.offset
+    is_as_it_was = target.factor == 1.0 and not target.offset
+    value = native if is_as_it_was else without_noise(native * target.factor + target.offset)
     if target.low is None or target.high is None or target.low <= value <= target.high:
         return value, Quality.GOOD, None
     return bad(replace(known, low=target.low, high=target.high).plausible(value) or "")

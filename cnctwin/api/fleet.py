@@ -1,7 +1,7 @@
 """A machine in short: what an overview of fifty of them shows."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from cnctwin.api.value_object import Plain, plain
@@ -48,8 +48,8 @@ def fleet_item(machine: str, online: bool, signals: Mapping[str, SignalReading])
     gaps = [value for reading in standing if isinstance(value := _known(reading), float)]
     item["gap"] = max(gaps, default=None)
     item["gap_reason"] = None if gaps else _why_no_gap(standing)
-    measured = (told.reading.timestamp_ms for name, told in signals.items() if not name.startswith(twin_signals.TWIN_PREFIX))
-    item["last_t"] = max(measured, default=None)
+    measured = [told.reading for name, told in signals.items() if not name.startswith(twin_signals.TWIN_PREFIX)]
+    item["last_t"] = newest_ms(measured)
     return item
 
 
@@ -60,6 +60,11 @@ def _why_no_gap(standing: Sequence[Reading]) -> str:
     reasons = Counter(reading.reason or "not known yet" for reading in standing)
     said = [one for one in reasons.most_common() if not one[0].endswith("is not offered")] or reasons.most_common()
     return said[0][0]
+
+
+def newest_ms(readings: Iterable[Reading]) -> int | None:
+    """Return the machine's own time by now: the newest stamp of a value, since nulls may be stamped by another clock."""
+    return max((reading.timestamp_ms for reading in readings if reading.quality is not Quality.BAD), default=None)
 
 
 def _known(reading: Reading) -> Plain:

@@ -15,6 +15,10 @@ Speed = Annotated[float, typer.Option(help="How many times faster than real time
 HttpPort = Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)]
 TcpPort = Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)]
 ClockOffset = Annotated[float, typer.Option(help="How far the control's clock is ahead")]
+AlarmEvery = Annotated[
+    float | None,
+    typer.Option("--alarm-every-s", help="Raise an alarm after so many seconds of work, which stops it for 30 s", min=1),
+]
 StateFile = Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)]
 
 
@@ -82,13 +86,22 @@ def simulate_focas(
     tool_number: Annotated[
         bool, typer.Option("--tool-number", help="With the option that tells the tool in the spindle")
     ] = False,
+    alarm_every_s: AlarmEvery = None,
     state_file: StateFile = None,
 ) -> None:
     """Show the simulated machine as a FANUC control does, over FOCAS Ethernet."""
     from cnctwin.standins.focas_server.serve import simulate_focas as serve
 
     with stopped_by_signals() as stop:
-        serve(stop, speed=speed, port=port, clock_offset_s=clock_offset_s, tool_number=tool_number, state_file=state_file)
+        serve(
+            stop,
+            speed=speed,
+            port=port,
+            clock_offset_s=clock_offset_s,
+            tool_number=tool_number,
+            alarm_every_s=alarm_every_s,
+            state_file=state_file,
+        )
 
 
 @control_app.command("opcua")
@@ -97,13 +110,22 @@ def simulate_opcua(
     port: TcpPort = 4840,
     clock_offset_s: ClockOffset = 0.0,
     is_open: Annotated[bool, typer.Option("--open", help="Also an endpoint without security")] = False,
+    alarm_every_s: AlarmEvery = None,
     state_file: StateFile = None,
 ) -> None:
     """Show the simulated machine as an OPC UA server does: SINUMERIK's names, and the companion models 40501 and 40502."""
     from cnctwin.standins.opcua_server.serve import simulate_opcua as serve
 
     with stopped_by_signals() as stop:
-        serve(stop, speed=speed, port=port, clock_offset_s=clock_offset_s, is_open=is_open, state_file=state_file)
+        serve(
+            stop,
+            speed=speed,
+            port=port,
+            clock_offset_s=clock_offset_s,
+            is_open=is_open,
+            alarm_every_s=alarm_every_s,
+            state_file=state_file,
+        )
 
 
 @control_app.command("lsv2")

@@ -40,8 +40,8 @@ class Awaited:
     known: the historian that was heard of in an earlier life; host: the one that is waited for now, empty: none
     """
 
-    def __init__(self, setting: bool | Literal["auto"], known: str, now_s: float) -> None:
-        self._setting = setting
+    def __init__(self, device: str, setting: bool | Literal["auto"], known: str, now_s: float) -> None:
+        self._device, self._setting = device, setting
         self.host = HISTORIAN_NODE if setting is True else known if setting == "auto" else ""
         self._heard: deque[tuple[str, HostState | None]] = deque(maxlen=STATES_MAX)
         self._began_s, self._receipt_s = now_s, -math.inf
@@ -80,7 +80,7 @@ class Awaited:
         text = self._text(kind, rows, silent_s)
         if kind is not self._told and (kind is not _History.NONE or now_s - self._began_s >= UNHEARD_S):
             self._told = kind
-            (_log.info if kind is _History.KEPT else _log.warning)("%s", text)
+            (_log.info if kind is _History.KEPT else _log.warning)("%s: %s", self._device, text)
         return {"health/awaited_rows": rows, "health/awaited_s": silent_s, "health/history": text}
 
     def _kind(self, silent_s: float) -> _History:

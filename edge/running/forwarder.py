@@ -92,7 +92,7 @@ class Forwarder:
         self._flights: deque[_Flight] = deque()
         self._confirmed: deque[int] = deque(maxlen=1_000)
         self._receipts = Receipts()
-        self._awaited = Awaited(limits.await_receipt, ring.historian(), clock())
+        self._awaited = Awaited(device, limits.await_receipt, ring.historian(), clock())
         self._kept: deque[tuple[int, int]] = deque()  # by a memory, and to be deleted
         self._token = self._landed = 0
         self._declared: frozenset[str] = frozenset()

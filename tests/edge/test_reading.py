@@ -1,15 +1,16 @@
 """One native text, one canonical value."""
 
 import math
+import struct
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import ConfigError
-from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value
+from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value, shortest_of_float32
 from edge.signals import signal
-from edge.units import conversion
+from edge.units import between, conversion
 from sparkplug.quality import Quality
 from twin.vocabulary.signals import SIGNALS
 
@@ -117,6 +118,34 @@ def test_a_unit_that_is_not_known_is_refused_with_those_that_are() -> None:
         conversion("FURLONG", "mm")
 
 
+@pytest.mark.parametrize(
+    ("native", "wanted", "value", "expected"),
+    [
+        ("MILLIMETER/SECOND", "mm/min", 2, 120),
+        ("m/min", "mm/min", 1.5, 1500),
+        ("INCH", "mm", 2, 50.8),
+        ("psi", "bar", 145.0377377, 10),
+        ("°F", "°C", 212, 100),
+        ("CELSIUS", "°F", 100, 212),
+        ("WATT", "kW", 1500, 1.5),
+        ("1/min", "rev/s", 120, 2),
+        ("", "mm", 3, 3),
+        ("mm", "", 3, 3),
+        ("strokes", "strokes", 3, 3),
+        ("strokes", "bar", 3, 3),  # it is not known, so nobody can say that it is wrong
+    ],
+)
+def test_what_a_control_states_becomes_the_unit_that_a_configuration_wants(
+    native: str, wanted: str, value: float, expected: float
+) -> None:
+    assert between(native, wanted).apply(value) == pytest.approx(expected)
+
+
+def test_a_unit_of_another_quantity_is_refused_with_both() -> None:
+    with pytest.raises(ConfigError, match="MILLIMETER is a length and bar a pressure"):
+        between("MILLIMETER", "bar")
+
+
 @given(st.sampled_from(sorted(SIGNALS)), st.text(max_size=40) | st.floats().map(repr))
 def test_any_text_gives_a_value_of_the_right_type_or_a_null_with_a_reason(name: str, text: str) -> None:
     known = signal(name)
@@ -142,3 +171,17 @@ def test_any_typed_value_gives_a_value_of_the_right_type_or_a_null_with_a_reason
 def test_a_name_that_is_not_canonical_is_refused() -> None:
     with pytest.raises(ConfigError, match="'spindle_speed' is no canonical name"):
         signal("spindle_speed")
+
+
+@pytest.mark.parametrize(
+    ("native", "factor", "told"), [(3.0, 0.1, 0.3), (1.06215333333333, 60.0, 63.7292), (0.1 + 0.2, 1.0, 0.1 + 0.2)]
+)
+def test_what_a_conversion_adds_of_binary_noise_is_not_published(native: float, factor: float, told: float) -> None:
+    assert read_value(Target("x", "plc_pressure", factor), native)[0] == told
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_a_value_of_32_bits_becomes_a_short_decimal_that_is_still_the_same_value(native: float) -> None:
+    short = shortest_of_float32(native)
+    assert struct.pack("<f", short) == struct.pack("<f", native)
+    assert len(repr(short).replace("-", "").partition("e")[0].replace(".", "").strip("0")) <= 9

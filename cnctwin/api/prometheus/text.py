@@ -7,6 +7,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from cnctwin.api.fleet import newest_ms
 from cnctwin.api.live.plant import NodeView
 from cnctwin.api.prometheus.validation import validation_metrics
 from cnctwin.api.sources import Sources
@@ -162,12 +163,10 @@ def _machines(machines: Mapping[str, tuple[bool, Mapping[str, Reading]]], now_ms
     online = GaugeMetricFamily("twin_source_online", "whether the machine's control is connected", labels=["machine"])
     gap = GaugeMetricFamily("twin_gap", "standing gap, rms over its floor", labels=["machine", "signal"])
     for machine, (is_online, readings) in machines.items():
-        newest_ms = max(
-            (r.timestamp_ms for name, r in readings.items() if not name.startswith(twin_signals.TWIN_PREFIX)), default=None
-        )
+        at_ms = newest_ms(one for name, one in readings.items() if not name.startswith(twin_signals.TWIN_PREFIX))
         online.add_metric([machine], float(is_online))
-        if newest_ms is not None:
-            age.add_metric([machine], max(now_ms - newest_ms, 0) / 1000.0)
+        if at_ms is not None:
+            age.add_metric([machine], max(now_ms - at_ms, 0) / 1000.0)
         for name, reading in readings.items():
             if twin_signals.is_gap(name) and (value := _number(reading)) is not None:
                 gap.add_metric([machine, name.removeprefix(twin_signals.GAP_PREFIX)], value)

@@ -7,6 +7,7 @@ from cnctwin.errors import UsageError
 from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.focas_server.server import FocasServer
 from cnctwin.standins.focas_server.shown import ControlDescription, coded
+from cnctwin.standins.simulated_control.alarm import RaisedAlarm, with_alarms
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
 from cnctwin.standins.simulated_machine.description import PROGRAM
@@ -14,6 +15,7 @@ from cnctwin.standins.simulated_machine.description import PROGRAM
 DAY_S = 24 * 3600.0
 PORT = 8193
 TOOLS = 5
+ALARM = (1012, "SPINDLE LUBRICATION FAILURE")  # EX1012: from 1000 on, alarms are the builder's
 RADIUS_WEAR, RADIUS, LENGTH_WEAR, LENGTH = range(4)  # the kinds of `cnc_rdtofs`
 
 
@@ -24,15 +26,20 @@ def simulate_focas(
     port: int = PORT,
     clock_offset_s: float = 0.0,
     tool_number: bool = False,
+    alarm_every_s: float | None = None,
     state_file: Path | None = None,
 ) -> None:
     """Serve a working day until stopped; says where, and keeps `state_file` up to date for a program that started us.
 
     clock_offset_s: how far the control's clock is ahead; tool_number: whether the control has the option for the tool number
+    alarm_every_s: the seconds of work before an alarm; None: there is none
     """
     if not 0 < speed <= 1000:
         raise UsageError(f"--speed {speed:g} is not between 0 and 1000; 1 is real time")
-    control = SimulatedControl(coded(production(DAY_S)), speed=speed, clock_offset_s=clock_offset_s)
+    day = production(DAY_S)
+    if alarm_every_s is not None:
+        day = with_alarms(day, RaisedAlarm(alarm_every_s, *ALARM))
+    control = SimulatedControl(coded(day), speed=speed, clock_offset_s=clock_offset_s)
     server = FocasServer(control, described(has_tool_number=tool_number), port=port)
     with server:
         print(f"{server.url} shows a FANUC control, which runs {PROGRAM.name}; Ctrl-C ends it", flush=True)

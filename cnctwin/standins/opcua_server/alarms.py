@@ -47,7 +47,9 @@ class ShownAlarm:
 
 def alarms_of(state: ControlState) -> tuple[ShownAlarm, ...]:
     """Return what a PLC would say of this moment of the simulated day: between two parts the door is open."""
-    return () if state.exec_state == "ACTIVE" else (ShownAlarm("700016", "Safety door open", 500, acknowledged=False),)
+    if state.exec_state == "ACTIVE" or state.alarm is not None:
+        return ()
+    return (ShownAlarm("700016", "Safety door open", 500, acknowledged=False),)
 
 
 class Alarms:

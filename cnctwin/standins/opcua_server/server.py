@@ -216,7 +216,7 @@ class OpcUaServer:
                 self._last[one] = value
                 await self._write(node, ua.DataValue(variant(one, value), ua.StatusCode(), now, now))
         if self._alarms is not None:
-            stopping = () if state.alarm is None else (ShownAlarm(str(state.alarm[0]), state.alarm[1]),)
+            stopping = () if state.alarm is None else (ShownAlarm(str(state.alarm[0]), state.alarm[1], acknowledged=False),)
             await self._alarms.show((*stopping, *self._more_alarms))
         server = self._server
         assert server is not None

@@ -8,17 +8,20 @@ from edge.errors import ConnectionLostError
 from edge.sample import SampleSet
 from edge.sweep import Sweep
 
+EXPERIMENTAL = "FANUC has not published this protocol: put each value beside the control's screen (docs/edge-focas.md)"
+
 
 def describe(config: Config) -> list[Row]:
     """Return what would be published for the control that the configuration names; what it refuses is a null with the reason."""
     _, frame = look(config)
     last = {sample.signal: sample for sample in frame.samples}
-    way = "experimental ethernet: " if config.source.backend is Backend.ETHERNET else ""
     rows = []
     for offer in frame.offers or ():
         sample = last.get(offer.signal)
         value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
-        rows.append(Row(offer.signal, way + offer.source, offer.declared.unit, offer.native_unit, value, reason))
+        rows.append(Row(offer.signal, offer.source, offer.declared.unit, offer.native_unit, value, reason))
+    if config.source.backend is Backend.ETHERNET:
+        rows.append(Row("(warning)", f"focas://{config.source.host}:{config.source.port}", "", "", None, EXPERIMENTAL))
     return rows
 
 

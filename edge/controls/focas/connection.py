@@ -17,7 +17,7 @@ from edge.controls.focas.address import address_of
 from edge.controls.focas.backend import backend_of
 from edge.controls.focas.calls import Answer, Call, FocasBackend, FocasValue, Identity, Request
 from edge.controls.focas.config import Config, Group
-from edge.controls.focas.plan import Refusals, Subject, quick, rare, slow, without_offset
+from edge.controls.focas.plan import Refusals, Subject, quick, rare, slow, unread, without_offset
 from edge.controls.focas.policy import OK, PROTOCOL, Policy, policy_of, told
 from edge.sample import ClockReading
 from edge.sweep import Fact, Hole, Sweep
@@ -147,7 +147,8 @@ class FocasConnection:
         clock = self._control_clock() if is_due else None
         if self._identity is None:
             return None
-        facts = (*(_identified(self._identity) if self._is_new else ()), *map(_fact, found), *told_none)
+        first, last = (_identified(self._identity), unread(self._config)) if self._is_new else ((), ())
+        facts = (*first, *map(_fact, found), *told_none, *last)
         sweep = Sweep(self._life, self._number, t_ms, facts, self._hole(t_ms, len(facts)), self._config.interval_ms, clock, True)
         if self._is_new:
             self._seen_ms = self._wall_ms()  # it took longer, for all that it asked

@@ -7,9 +7,11 @@ from pydantic import ValidationError
 from edge.config import EdgeConfig
 from edge.controls.focas.check import look
 from edge.controls.focas.config import FocasConfig
+from edge.controls.focas.mapping import FocasMapping
 from edge.errors import ConfigError
 from edge.sample import SampleSet
 from edge.sweep import Sweep
+from edge.tool_change import CUE
 from sparkplug.shown_address import shown_address
 
 PORT = 8193
@@ -50,8 +52,7 @@ def _source(url: str) -> FocasConfig:
 def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) -> str:
     """The configuration, with what the control says of itself as comments."""
     told = {fact.key.removeprefix("control."): str(fact.value) for fact in sweep.facts if fact.key.startswith("control.")}
-    refused = [f"#   {fact.key}: {fact.fault}" for fact in sweep.facts if fact.fault]
-    nulls = {sample.signal for sample in frame.samples if sample.value is None}
+    nulls = {sample.signal: sample.reason or "" for sample in frame.samples if sample.value is None}
     signals = [offer.signal for offer in frame.offers or () if offer.signal not in nulls]
     lines = [
         f"# Drafted from focas://{source.host}:{source.port}. Values that are not here have their defaults; "
@@ -74,10 +75,21 @@ def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) ->
         *CHOSEN_LINES,
         "# Published:",
         *(_comment(f"  {name}") for name in signals),
-        "# Not told now, or refused by the control:",
-        *(map(_one_line, refused) if refused else ("#   nothing",)),
+        "# Null now, and why:",
+        *(_null_lines(source, sweep, nulls) or ["#   nothing"]),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _null_lines(source: FocasConfig, sweep: Sweep, nulls: dict[str, str]) -> list[str]:
+    """Return a line for each reason with the signals that are null for it, and for what is refused and feeds none."""
+    mapping = FocasMapping(source, ())
+    unfed = {fact.key: fact.fault for fact in sweep.facts if fact.fault and mapping.target(fact.key) is None}
+    why = {name: reason for name, reason in (nulls | unfed).items() if name != CUE}
+    return [
+        _comment(f"  {', '.join(name for name, one in why.items() if one == reason)}: {reason}")
+        for reason in dict.fromkeys(why.values())
+    ]
 
 
 def _comment(text: str) -> str:

@@ -9,7 +9,7 @@ from edge.chosen import Chosen
 from edge.config import SignalSection
 from edge.controls.focas.address import address_of
 from edge.controls.focas.config import Config, FocasConfig, LifeUnit
-from edge.controls.focas.plan import Signals, change_bit
+from edge.controls.focas.plan import UNREAD, Signals, change_bit
 from edge.controls.focas.states import CueRule
 from edge.reading import Target
 from edge.signals import signal
@@ -17,6 +17,7 @@ from edge.units import conversion
 
 _AXIS = re.compile(r"(position|servo_load)\.([A-Z]\d{0,2})")
 _ROTARY = "ABC"
+NO_SOURCE = "none"  # of a signal that is a null with the way out
 _DEFAULT = SignalSection()
 _PLAIN = {
     "program.name": ("program", "cnc_exeprgname"),
@@ -90,6 +91,8 @@ class FocasMapping:
 
     def source_of(self, key: str) -> str:
         """Return where a fact comes from, for births and `edge check`."""
+        if key.startswith(UNREAD):
+            return NO_SOURCE
         if axis := _AXIS.fullmatch(key):
             return f"{'cnc_rddynamic2 machine' if axis[1] == 'position' else 'cnc_rdsvmeter'} {axis[2]}"
         if key in self.overrides:
@@ -113,6 +116,8 @@ class FocasMapping:
             return "tool_number"
         if key == self.rule.bit_fact:
             return ""
+        if key.startswith(UNREAD):
+            return key.removeprefix(UNREAD)
         if axis := _AXIS.fullmatch(key):
             suffix = "load_pct" if axis[1] == "servo_load" else "pos_deg" if axis[2][0] in _ROTARY else "pos_mm"
             return f"axis_{axis[2].lower()}_{suffix}"

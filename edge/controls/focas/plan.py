@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from edge.controls.focas.calls import OFFSET_KINDS, Answer, Call, FocasValue, Request, keys_of
-from edge.controls.focas.config import Backend, FocasConfig, Group, ToolSource
+from edge.controls.focas.config import Backend, FocasConfig, Group, LifeUnit, ToolSource
 from edge.controls.focas.pmc import PmcAddress, pmc_address
 from edge.controls.focas.policy import Policy, policy_of
 from edge.sweep import Fact, Plain
@@ -99,6 +99,10 @@ class Subject(NamedTuple):
 
 _SUBJECT = {"modal.T": "tool", "modal.H": "length_offset", "modal.D": "radius_offset", "program.number": "program"}
 NO_OFFSET = "no offset is in force: {} 0"
+UNREAD = "unread."  # before the signal, in the key of a fact that this configuration cannot ask for
+BY_LIBRARY = 'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/edge-focas.md)'
+BY_UNIT = 'FOCAS does not tell the unit: set focas.tool_life_unit = "minutes" or "uses" (docs/edge-focas.md)'
+_LIFE_SIGNALS = ("tool_life_used_min", "tool_life_limit_min", "tool_life_used_count", "tool_life_limit_count")
 
 
 def _number(value: Plain) -> int | None:
@@ -121,6 +125,18 @@ def rare(config: FocasConfig, subject: Subject, is_lathe: bool) -> tuple[Request
         requests += [Request(Call.LIFE)] if config.tool_life_unit else []
         requests += [Request(Call.HISTORY)] if Group.HISTORY in config.groups else []
     return tuple(requests)
+
+
+def unread(config: FocasConfig) -> tuple[Fact, ...]:
+    """Return the facts of signals that cannot be read as the control is asked, each with the way out as its fault.
+
+    >>> [fact.key for fact in unread(FocasConfig(groups=frozenset({Group.HISTORY})))][:2]
+    ['unread.alarm_history', 'unread.tool_life_used_min']
+    """
+    is_library = config.backend is Backend.LIBRARY
+    history = () if is_library or Group.HISTORY not in config.groups else ("alarm_history",)
+    life = _LIFE_SIGNALS if config.tool_life_unit is LifeUnit.UNKNOWN else ()
+    return tuple(Fact(UNREAD + signal, None, BY_UNIT if is_library else BY_LIBRARY) for signal in (*history, *life))
 
 
 def without_offset(config: FocasConfig, subject: Subject, is_lathe: bool) -> tuple[Fact, ...]:

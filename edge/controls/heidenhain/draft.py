@@ -6,6 +6,7 @@ from edge.config import EdgeConfig
 from edge.controls.heidenhain.check import first_look, looked_at_frame
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.errors import ConfigError
+from edge.sample import EMPTY
 from edge.sweep import Sweep
 from sparkplug.shown_address import shown_address
 
@@ -43,7 +44,9 @@ def draft(url: str, device: str = "") -> str:
     ]
     told = [offer for offer in offers if last[offer.signal].value is not None]
     silent = [offer for offer in offers if last[offer.signal].value is None]
-    lines += [f"#   {offer.signal} = {_one_line(str(last[offer.signal].value))[:80]}  ({offer.source})" for offer in told]
+    lines += [
+        f"#   {offer.signal} = {_one_line(str(last[offer.signal].value))[:80] or EMPTY}  ({offer.source})" for offer in told
+    ]
     lines += ["# Not told now, and why:"]
     lines += [f"#   {offer.signal}: {_one_line(last[offer.signal].reason or '')[:120]}" for offer in silent] or ["#   none"]
     lines += [

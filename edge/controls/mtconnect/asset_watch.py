@@ -23,6 +23,7 @@ NOTHING = ("", "UNAVAILABLE")
 class AssetWatch:
     """`asset_id`: the tool in the spindle, "" where there is none or none is known; `at_ms`, `sequence`: what it rests on.
 
+    machine_ms: the machine's own time by now
     is_wanted: the agent is to be asked now; is_stale: it is to be asked when `ASK_MS_MIN` have passed since `asked_ms`, which the
     agent's clock showed
     """
@@ -31,13 +32,14 @@ class AssetWatch:
     changed_item: str = ""
     asset_id: str = ""
     at_ms: int = 0
+    machine_ms: int = 0
     sequence: int = 0
     is_wanted: bool = False
     is_stale: bool = False
     asked_ms: int = 0
 
     def after(self, item: str, value: str, time_ms: int, sequence: int) -> "AssetWatch":
-        """Return the watch after one more observation of the device."""
+        """Return the watch after one more observation of the device, of which the machine's own time is `time_ms`."""
         if not self.tool_item:
             return self
         if item == self.tool_item:

@@ -64,13 +64,14 @@ def address_of(chosen: Chosen) -> tuple[str, str]:
 
 
 def chosen_items(device: DeviceModel, chosen: Iterable[Chosen]) -> Iterator[tuple[ChosenItem, Offer]]:
-    """The items that the configuration reads by address; ConfigError where the device has not got one."""
+    """The items that the configuration reads by address; ConfigError for one that is missing, or has a unit of another kind."""
     for one in chosen:
         name, key = address_of(one)
         item = device.item(name)
         if item is None or item.category == "CONDITION":
             raise ConfigError(f"{one.table}.address = {one.address!r}: device {device.name!r} has {_near(device, name)}")
-        yield ChosenItem(item.id, key, one.target(item.id)), one.offer(item.label + (f"[{key}]" if key else ""))
+        label = item.label + (f"[{key}]" if key else "")
+        yield ChosenItem(item.id, key, one.target(item.id, item.unit)), one.offer(label, item.unit)
 
 
 def _near(device: DeviceModel, name: str) -> str:

@@ -1,4 +1,8 @@
-"""From the observations of a document to samples: each once, in the order of their sequence. Pure."""
+"""From the observations of a document to samples: each once, in the order of their sequence. Pure.
+
+The agent stamps some observations by its own clock: those of assets, and UNAVAILABLE where it lost the adapter. Where a recording
+is played to an agent they are years after the machine's, so the machine's time, by which an asset is dated, leaves them out.
+"""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -14,6 +18,7 @@ from edge.reading import Outcome, Target, read
 from edge.sample import UNAVAILABLE, ClockReading, Drop, EdgeSample, SampleSet
 from sparkplug.quality import Quality
 
+OF_THE_AGENT = ("AssetAdded", "AssetChanged", "AssetRemoved", "AssetCount", "AssetCountDataSet", "Unavailable")
 DOCUMENT_MS_MAX = 500  # from its making to the edge, for most documents; those that take longer are outvoted
 
 
@@ -25,6 +30,7 @@ def take(
     dropped: Counter[str] = Counter()
     taken: list[EdgeSample] = []
     alarms, asset, seen, newest, available = cursor.alarms, cursor.asset, set[int](), None, None
+    machine_ms = asset.machine_ms
     for observation in sorted(document.observations, key=lambda o: o.sequence or 0):
         sequence, time_ms = observation.sequence, observation.timestamp_ms
         if sequence is None or time_ms is None:
@@ -37,7 +43,8 @@ def take(
         if not is_ours(cursor, observation):
             dropped[Drop.OTHER_DEVICE] += 1
             continue
-        newest = time_ms if newest is None else max(newest, time_ms)
+        if observation.value != UNAVAILABLE_WORD and observation.element not in OF_THE_AGENT:
+            newest = machine_ms = time_ms if newest is None else max(newest, time_ms)
         if observation.data_item_id == cursor.availability_id:
             available = observation.value != UNAVAILABLE_WORD
         if observation.is_condition and cursor.alarm_signals:
@@ -50,13 +57,13 @@ def take(
         if not samples:
             dropped[Drop.UNMAPPED] += 1
         taken += samples
-        before, asset = asset, asset.after(observation.data_item_id, observation.value, time_ms, sequence)
+        before, asset = asset, asset.after(observation.data_item_id, observation.value, machine_ms or time_ms, sequence)
         if before.asset_id != asset.asset_id or (observation.data_item_id == asset.tool_item and not asset.asset_id):
             taken += _no_tool(cursor, asset, observation, is_baseline)
     if next_sequence >= cursor.next_sequence:  # an older document shows an older clock
         asset = asset.due(newest or asset.asked_ms if document.header.created_ms is None else document.header.created_ms)
-    if asset.is_wanted and newest is not None:
-        asset = replace(asset, at_ms=max(asset.at_ms, newest))  # what is asked for now is as of now
+    if asset.tool_item and newest is not None:  # what is asked for now is as of now
+        asset = replace(asset, machine_ms=newest, at_ms=max(asset.at_ms, newest) if asset.is_wanted else asset.at_ms)
     phase = Phase.ASSET if asset.is_wanted and cursor.phase is Phase.SAMPLE else cursor.phase
     after = replace(
         cursor, phase=phase, asset=asset, alarms=alarms, next_sequence=max(floor, next_sequence, max(seen, default=-1) + 1)

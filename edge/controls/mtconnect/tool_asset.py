@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 
 from edge.controls.mtconnect.xml import local_name
 from edge.errors import ConfigError
-from edge.reading import Outcome, Target, bad, read_value
+from edge.reading import Outcome, Target, bad, read_value, without_noise
 from edge.units import conversion
 from sparkplug.quality import Quality
 
@@ -43,7 +43,7 @@ class Life:
         """Return how much of its life the tool has used."""
         if self.direction != "DOWN" or self.value is None:
             return self.value
-        return None if self.initial is None else self.initial - self.value
+        return None if self.initial is None else without_noise(self.initial - self.value)
 
     def most(self) -> float | None:
         """Return how much it may use; None where there is no limit."""

@@ -104,7 +104,8 @@ async def read_all(config: Config, client: Any, nodes: Any) -> tuple[Fact, ...]:
     """One value of each node, those that are not there with the reason; then those of the tool in the spindle."""
     from edge.controls.opcua import life_reader, plain, session, tool_reader  # noqa: PLC0415  asyncua is an extra
 
-    facts = [Fact(one.key, fault=one.fault) for one in nodes if one.node is None]
+    facts = await session.unit_facts(config, client, [(one.key, one.node) for one in nodes if one.node is not None])
+    facts += [Fact(one.key, fault=one.fault) for one in nodes if one.node is None]
     there = [one for one in nodes if one.node is not None]
     for begin in range(0, len(there), AT_ONCE):
         some = there[begin : begin + AT_ONCE]

@@ -234,7 +234,8 @@ class OpcUaConnection:
 
         watched = await session.watch(self._config, client, there, self._keep_alive_s, heard)
         faults = {one.key: one.fault for one in nodes if one.node is None} | watched.refused
-        facts = [Fact(key, fault=fault) for key, fault in faults.items()]
+        facts = await session.unit_facts(self._config, client, there)
+        facts += [Fact(key, fault=fault) for key, fault in faults.items()]
         told = await event_session.listen(self._config, client, watched.subscription)
         if told is not None:
             self._events = event_session.EventWatch(client, watched.subscription, told, self._clock)

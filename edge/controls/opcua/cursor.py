@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import NamedTuple
 
+from edge.chosen import Chosen
 from edge.controls.opcua.alarm_samples import KEYS, Heard, told
 from edge.controls.opcua.config import Config, is_published, points_of
-from edge.controls.opcua.point import TOOL, Point
+from edge.controls.opcua.point import TOOL, UNIT, Point
 from edge.controls.opcua.spindle_tool import Tools, in_spindle
 from edge.controls.opcua.spindle_tool import told as tool_told
 from edge.controls.opcua.tool_life import TOOL_LIFE, Limits, counted_up, life_samples, noted
@@ -33,7 +34,7 @@ ALARM = "alarm"
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """The meaning of one key's values."""
+    """The meaning of one key's values; `fault`: why there is none."""
 
     target: Target
     words: tuple[tuple[str, str], ...] = ()
@@ -42,6 +43,7 @@ class Meaning:
     native_unit: str = ""
     unit: str = ""
     counts_down_from: str = ""
+    fault: str = ""
 
     @property
     def offer(self) -> Offer:
@@ -54,6 +56,7 @@ class Meaning:
 class Cursor:
     """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet).
 
+    units: those that the server states of what the configuration chose, by signal
     tool_ms: since when it is that one
     heard: events and the alarms from them; alarm_variable: the last value of the variable that tells an alarm where no event does
     limits: the last values of signals from which others count down; life: signals of a tool's life that were published
@@ -62,6 +65,7 @@ class Cursor:
     position: SweepPosition = field(default_factory=SweepPosition)
     meanings: tuple[Meaning, ...] = ()
     unmapped: tuple[str, ...] = ()
+    units: tuple[tuple[str, str], ...] = ()
     tools: Tools = ()
     tool: str = "?"
     tool_ms: int = 0
@@ -165,18 +169,22 @@ def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
     ]
     if not fresh or len(known) + len(fresh) > MEANINGS_MAX:
         return cursor
+    stated = {fact.key.removeprefix(UNIT): str(fact.value) for fact in facts if fact.key.startswith(UNIT)}
+    units = dict(cursor.units) | stated
     points, found = points_of(config), list[Meaning]()
     unmapped: list[str] = []
     for key in fresh:
-        meaning = _meaning(config, points, key)
+        meaning = _meaning(config, points, key, units.get(key, ""))
         if meaning is None:
             unmapped.append(key)
         else:
             found.append(meaning)
-    return replace(cursor, meanings=(*cursor.meanings, *found), unmapped=(*cursor.unmapped, *unmapped))
+    meanings, left = (*cursor.meanings, *found), (*cursor.unmapped, *unmapped)
+    return replace(cursor, meanings=meanings, unmapped=left, units=tuple(units.items()))
 
 
-def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | None:
+def _meaning(config: Config, points: Iterable[Point], key: str, unit: str) -> Meaning | None:
+    """Return what a key's values are; `unit`: what the server states of a chosen one, which is known with its first value."""
     point = next((point for point in points if point.signal != TOOL and _stands_for(point.signal, key)), None)
     if point is None:
         return None
@@ -190,7 +198,7 @@ def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | Non
         return None
     chosen = next((one for one in config.chosen if one.signal == key), None)
     if chosen is not None:
-        return Meaning(chosen.target(key), source=point.label, unit=chosen.unit)
+        return _chosen(chosen, point, key, unit)
     low = section.low if section and section.low is not None else known.low
     high = section.high if section and section.high is not None else known.high
     scale = point.scale * (section.scale if section else 1.0)
@@ -198,6 +206,13 @@ def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | Non
     target = Target(key, key, way.factor * scale, way.offset, None if is_left else low, None if is_left else high)
     words = tuple(point.words.items())
     return Meaning(target, words, point.prefix, point.label, native, counts_down_from=point.counts_down_from)
+
+
+def _chosen(chosen: Chosen, point: Point, key: str, unit: str) -> Meaning:
+    try:
+        return Meaning(chosen.target(key, unit), source=point.label, native_unit=unit, unit=chosen.unit)
+    except ConfigError as error:
+        return Meaning(chosen.target(key), source=point.label, native_unit=unit, unit=chosen.unit, fault=str(error))
 
 
 def _stands_for(template: str, key: str) -> bool:
@@ -254,7 +269,8 @@ def _samples(
 
 def _sample(meaning: Meaning, fact: Fact, sweep: Sweep) -> EdgeSample:
     at_ms = sweep.t_ms if fact.t_ms is None else fact.t_ms
-    value, quality, reason = bad(fact.fault) if fact.fault else read_value(meaning.target, _worded(meaning, fact))
+    why = fact.fault or meaning.fault
+    value, quality, reason = bad(why) if why else read_value(meaning.target, _worded(meaning, fact))
     return EdgeSample(meaning.target.signal, value, at_ms, quality, reason, sweep.number)
 
 

@@ -10,7 +10,8 @@ from urllib.parse import parse_qsl
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig, one_line
+from edge.config import EdgeConfig
+from edge.config_fault import one_line
 from edge.controls.opcua.alarm_samples import Heard
 from edge.controls.opcua.check import alarm_rows, read_all, read_events, run
 from edge.controls.opcua.config import Config, OpcUaConfig
@@ -18,7 +19,7 @@ from edge.controls.opcua.cursor import parse, start
 from edge.controls.opcua.library import require
 from edge.controls.opcua.point import maps
 from edge.errors import ConfigError, ConnectionLostError
-from edge.sample import SampleSet
+from edge.sample import EMPTY, SampleSet
 from edge.signals import signal
 from edge.sweep import Sweep
 from edge.units import conversion
@@ -172,7 +173,7 @@ def _signals(found: SampleSet, units: dict[str, str]) -> list[str]:
             lines += [f"[signals.{offer.signal}]  # {offer.source}", f"native_unit = {_quoted(native)}"]
         else:
             unit = units.get(offer.signal, "")
-            lines.append(f"# {offer.signal}: {offer.source}{f' in {unit}' if unit else ''}, now {str(shown)[:60]!r}")
+            lines.append(f"# {offer.signal}: {offer.source}{f' in {unit}' if unit else ''}, now {str(shown)[:60] or EMPTY}")
     return lines
 
 

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 
 from asyncua import ua
 
+from edge.reading import shortest_of_float32
 from edge.sweep import Fact, Plain
 
 TEXT_LENGTH_MAX = 8192
@@ -28,6 +29,8 @@ def as_fact(key: str, value: ua.DataValue, *, element: int | None = None, stamps
     if not status.is_good():
         return Fact(key, fault=status_name(status), t_ms=at_ms)
     plain, fault = _plain(None if value.Value is None else value.Value.Value, element)
+    if isinstance(plain, float) and value.Value is not None and value.Value.VariantType is ua.VariantType.Float:
+        plain = shortest_of_float32(plain)
     return Fact(key, plain, fault, at_ms)
 
 

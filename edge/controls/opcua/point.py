@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from edge.errors import ConfigError
 
 TOOL = "tool"  # the pseudo signal of a point that belongs to one of many tools, see edge.controls.opcua.spindle_tool
+UNIT = "unit."  # before the signal, in the key of a fact that tells the unit which the server states
 _NODE = re.compile(r"(?:nsu=(?P<uri>[^;]+);)?(?P<kind>[sigb])=(?P<identifier>.+)", re.DOTALL)
 _GUID = r"[0-9a-fA-F]{8}(-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}"
 _BY_KIND = {"i": r"\d{1,10}", "g": _GUID, "b": r"[A-Za-z0-9+/]+={0,2}", "s": r"(?s).{1,4096}"}

@@ -25,7 +25,9 @@ from edge.controls.opcua.certificates import Identity, check_trust, fingerprint,
 from edge.controls.opcua.config import MODES, POLICIES, Config
 from edge.controls.opcua.library import ReadOnlyGuard
 from edge.controls.opcua.plain import stamp_ms, status_name
+from edge.controls.opcua.point import UNIT
 from edge.errors import ConfigError, ConnectionLostError
+from edge.sweep import Fact
 
 SESSION_S = 60.0
 GOODBYE_S = 0.5
@@ -296,6 +298,13 @@ async def units_of(client: Client, nodes: dict[str, ua.NodeId]) -> dict[str, str
             name = getattr(getattr(value, "Value", None), "DisplayName", None)
             found[key] = str(getattr(name, "Text", "") or "")
     return found
+
+
+async def unit_facts(config: Config, client: Client, nodes: Sequence[tuple[str, ua.NodeId]]) -> list[Fact]:
+    """The units that the server states of what [variables] and [plc] chose, as facts."""
+    chosen = {one.signal for one in config.chosen}
+    units = await units_of(client, {key: node for key, node in nodes if key in chosen})
+    return [Fact(UNIT + key, unit) for key, unit in units.items() if unit]
 
 
 def fingerprint_of(client: Client) -> str:

@@ -9,7 +9,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 
-from edge.reading import Target, bad, read_value
+from edge.reading import Target, bad, read_value, without_noise
 from edge.sample import EdgeSample
 from edge.signals import signal
 from edge.sweep import Fact
@@ -39,8 +39,12 @@ def counted_up(sample: EdgeSample, limit_signal: str, limits: Limits) -> EdgeSam
         why = f"the control tells what is left, {left:g}, which is more than the limit of {limit:g}"
     else:
         why = signal(sample.signal).plausible(limit - left) or ""
-    value, quality, reason = bad(why) if why or limit is None else (limit - left, sample.quality, sample.reason)
+    value, quality, reason = bad(why) if why or limit is None else (_used(limit, left), sample.quality, sample.reason)
     return replace(sample, value=value, quality=quality, reason=reason)
+
+
+def _used(limit: float, left: float) -> float:
+    return limit - left if isinstance(limit, int) and isinstance(left, int) else without_noise(limit - left)
 
 
 @dataclass(frozen=True, slots=True)

@@ -161,7 +161,7 @@ def test_false_waits_for_nobody(tmp_path: Path) -> None:
 
 
 def test_true_waits_for_a_historian_that_nobody_has_heard_of() -> None:
-    awaited = Awaited(True, "", 0.0)
+    awaited = Awaited("vmc", True, "", 0.0)
     awaited.hear(HISTORIAN_NODE, None)
     assert not awaited.settle(-1.0)
     assert awaited.host == HISTORIAN_NODE

@@ -82,7 +82,8 @@ export class Machine {
       meaning: given.meaning ?? held?.meaning ?? null,
     });
     this.changed.add(signal);
-    if (Number.isFinite(given.t) && given.t > this.lastT) this.lastT = given.t;
+    // A null may be stamped by another clock than the machine's: by that of an agent that has lost it.
+    if (given.quality !== "bad" && given.t > this.lastT) this.lastT = given.t;
     if (series && Number.isFinite(given.t)) this.#keep(signal, given.t, given.value, given.quality ?? "good");
   }
 

@@ -25,11 +25,12 @@ def server() -> Iterator[FocasServer]:
         yield one
 
 
-def test_check_shows_each_signal_its_function_and_that_the_way_is_experimental(server: FocasServer) -> None:
+def test_check_shows_each_signal_its_function_and_warns_that_the_protocol_is_not_published(server: FocasServer) -> None:
     rows = {row.signal: row for row in describe(EdgeConfig(source=FocasConfig(port=server.port)))}
     assert (rows["spindle_rpm"].value, rows["spindle_rpm"].unit) == (3500.0, "rev/min")
-    assert rows["spindle_rpm"].source == "experimental ethernet: cnc_acts"
-    assert rows["axis_z_pos_mm"].source.endswith("cnc_rddynamic2 machine Z")
+    assert rows["spindle_rpm"].source == "cnc_acts"
+    assert rows["axis_z_pos_mm"].source == "cnc_rddynamic2 machine Z"
+    assert str(rows["(warning)"].reason).startswith("FANUC has not published this protocol")
     assert {"tool_number", "nc_block", "program", "alarm", "feed_override_pct"} <= rows.keys()
 
 
@@ -60,7 +61,33 @@ changing = {{ address = "R100.0", kind = "flag" }}
     assert json.loads(str(shown["alarms"][0]))[0]["code"] == "EX1005"
     assert (shown["variable_part_width"], shown["plc_changing"]) == ((80.0, "mm"), (False, ""))
     assert rows["variable_vacant"].reason == "unavailable: the variable is vacant"
-    assert "alarm_history" not in rows  # no command is known for it
+
+
+UNREAD = ("alarm_history", "tool_life_used_min", "tool_life_limit_min", "tool_life_used_count", "tool_life_limit_count")
+
+
+@pytest.mark.parametrize("signal", UNREAD)
+def test_what_only_the_library_can_read_is_a_null_that_says_the_way_out(server: FocasServer, signal: str) -> None:
+    rows = {row.signal: row for row in describe(EdgeConfig(source=FocasConfig(port=server.port)))}
+    assert (rows[signal].value, rows[signal].source) == (None, "none")
+    assert rows[signal].reason == (
+        'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/edge-focas.md)'
+    )
+
+
+def test_a_group_that_is_left_out_or_a_signal_that_is_not_published_is_not_there_as_a_null_either(server: FocasServer) -> None:
+    text = f"""
+[machine]
+adapter = "focas"
+[focas]
+port = {server.port}
+groups = ["alarms"]
+[signals.tool_life_used_min]
+publish = false
+"""
+    shown = {row.signal for row in describe(parse(text, Path("edge.toml")))}
+    assert {"alarm_history", "tool_life_used_min"} & shown == set()
+    assert "tool_life_limit_min" in shown
 
 
 @pytest.mark.parametrize(
@@ -92,7 +119,8 @@ def test_a_draft_can_be_used_as_it_is(server: FocasServer) -> None:
     config = parse(text, Path("edge.toml"))
     assert (config.machine.name, config.source.port, config.source.host) == ("vmc-1", server.port, "127.0.0.1")
     assert "# 31i-M series" in text
-    assert "#   spindle_load: EW_NOOPT (6)" in text
+    assert "#   spindle_load_pct: EW_NOOPT (6)" in text
+    assert f"#   {', '.join(UNREAD)}: only by FANUC's own library" in text
     assert {row.signal for row in describe(config)} >= {"spindle_rpm", "exec_state"}
 
 

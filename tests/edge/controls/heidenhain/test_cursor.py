@@ -181,7 +181,7 @@ def test_plc_values_go_through_scale_and_limits_and_come_before_what_the_control
     player = Player(plc={"spindle_load_pct": "W1008", "feed_override_pct": "W2"})
     player.config = EdgeConfig(source=player.config.source, signals={"spindle_load_pct": SignalSection(scale=0.1)})
     given = player.look(1, plc__spindle_load_pct=413, plc__feed_override_pct=80, feed_override=100.0)
-    assert (value(given, "spindle_load_pct").value, value(given, "feed_override_pct").value) == (41.300000000000004, 80.0)
+    assert (value(given, "spindle_load_pct").value, value(given, "feed_override_pct").value) == (41.3, 80.0)
     assert value(player.look(1, plc__spindle_load_pct=9500), "spindle_load_pct").reason == "outside 0 to 200 %: 950"
 
 

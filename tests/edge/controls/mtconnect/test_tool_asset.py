@@ -13,7 +13,7 @@ from edge.controls.mtconnect.check import describe
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import error_document
 from edge.controls.mtconnect.cursor import next_request
-from edge.controls.mtconnect.documents import AssetsDocument, parse_document
+from edge.controls.mtconnect.documents import AssetsDocument, parse_document, timestamp_ms
 from edge.controls.mtconnect.state import Cursor, Phase
 from edge.controls.mtconnect.tool_asset import Life, ToolAsset
 from edge.errors import ConfigError
@@ -38,6 +38,11 @@ def asset(asset_id: str, minutes: str = "12") -> bytes:
         f'{minutes}</ToolLife><Measurements><FunctionalLength units="INCH">5</FunctionalLength></Measurements>'
         "</CuttingToolLifeCycle></CuttingTool></Assets></MTConnectAssets>"
     ).encode()
+
+
+def changed_asset(sequence: int, asset_id: str, time: str) -> str:
+    """Return the observation as an agent sends it: the element says that it is of an asset."""
+    return value("ac", sequence, asset_id, time=time, element="AssetChanged")
 
 
 def loaded(tool: str = "7.1") -> Cursor:
@@ -99,7 +104,8 @@ def test_the_agent_is_asked_for_the_tool_and_sampling_goes_on_where_it_was() -> 
 def test_an_asset_that_changes_often_is_asked_for_every_five_seconds_at_most() -> None:
     cursor, _ = fed(asset("7.1"), cursor=loaded())
     for second, phase in ((1, Phase.SAMPLE), (4, Phase.SAMPLE), (5, Phase.ASSET)):
-        changed, created = value("ac", 10 + second, "7.1"), f"2026-01-01T00:00:{second:02d}Z"
+        created = f"2026-01-01T00:00:{second:02d}Z"
+        changed = changed_asset(10 + second, "7.1", time="2031-06-01T00:00:00Z")  # the stamp of ASSET_CHANGED dates nothing
         cursor, _ = fed(streams(11 + second, [changed], created=created), cursor=cursor)
         assert cursor.phase is phase
     later = streams(60, [value("ac", 50, "8.1")], created="2026-01-01T01:00:00Z")
@@ -122,6 +128,16 @@ def test_a_clock_of_the_agent_that_is_set_back_does_not_hold_a_change_back() -> 
     cursor, _ = fed(asset("7.1"), cursor=loaded())
     cursor, _ = fed(streams(12, [value("ac", 11, "7.1")], created="2025-12-31T23:00:00Z"), cursor=cursor)
     assert cursor.phase is Phase.ASSET
+
+
+@pytest.mark.parametrize("days", ["2031-06-01", "2019-06-01"])
+def test_the_tool_is_dated_by_the_machine_and_not_by_the_clock_of_the_agent_or_the_day_of_its_measurement(days: str) -> None:
+    cut = value("msg", 6, "cut", time="2026-01-01T00:00:07Z")
+    lost = value("avail", 7, "UNAVAILABLE", time=f"{days}T00:00:00Z")
+    found = [value("ta", 5, "7.1", time="2026-01-01T00:00:05Z"), cut, lost, changed_asset(8, "7.1", time=f"{days}T00:00:00Z")]
+    cursor, frame = fed(with_tool(), streams(10, found))
+    stamps = {one.timestamp_ms for one in fed(asset("7.1"), cursor=cursor)[1].samples}
+    assert stamps == {frame.newest_ms} == {timestamp_ms("2026-01-01T00:00:07Z")}
 
 
 @pytest.mark.parametrize(("told", "why"), [("", "no tool in the spindle"), ("UNAVAILABLE", "unavailable")])
@@ -193,3 +209,18 @@ def test_check_shows_the_tool_of_an_agent_and_a_wrong_address_is_one_line(tmp_pa
         with pytest.raises(ConfigError) as caught:
             describe(parse_file(text.format(agent.url, "Lp1CommonVariabel"), tmp_path / "e.toml"))
     assert "variables.x.address = 'Lp1CommonVariabel': device 'OKUMA' has no such item with values; near are" in str(caught.value)
+
+
+def test_a_unit_that_the_agent_declares_is_converted_or_refused_in_one_line() -> None:
+    def with_unit(unit: str) -> EdgeConfig[MtconnectConfig]:
+        chosen = TypeAdapter(Variables).validate_python({"speed": {"address": "rpm", "unit": unit}})
+        return EdgeConfig(source=MtconnectConfig(), variables=chosen)
+
+    config = with_unit("rev/s")
+    _, frame = fed(with_tool(), streams(6, [value("rpm", 5, "900")]), config=config)
+    assert dict(values(frame))["variable_speed"] == 15.0
+    _, frame = fed(with_tool(), config=with_unit("bar"))
+    assert frame.error == (
+        "variables.speed.unit = 'bar': the control says otherwise: REVOLUTION/MINUTE is a speed of rotation and bar a pressure; "
+        "correct it, or add a scale"
+    )

@@ -30,7 +30,7 @@ from edge.signals import signal
         ('server_fingerprint = "12:34"', "is no SHA-256 fingerprint"),
         ('username = "edge"', "username needs password_env"),
         ('user_certificate = "a.der"', "user_certificate and user_key belong together"),
-        ("queue_size = 0", "greater than or equal to 1"),
+        ("queue_size = 0", "must be 1 or more"),
         ("trust_all = true", "no such key"),
     ],
 )

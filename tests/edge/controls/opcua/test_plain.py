@@ -46,6 +46,12 @@ def test_a_value_is_plain_or_a_fault_says_what_it_is(value: object, element: int
     assert (fact.value, fact.fault, fact.t_ms) == (*expected, AT_MS)
 
 
+@pytest.mark.parametrize(("kind", "told"), [("Float", 12.3), ("Double", 12.300000190734863)])
+def test_a_value_of_32_bits_is_told_as_the_control_shows_it(kind: str, told: float) -> None:
+    value = ua.Variant(12.300000190734863, ua.VariantType[kind])
+    assert plain.as_fact("k", ua.DataValue(value, SourceTimestamp=AT)).value == told
+
+
 @pytest.mark.parametrize(
     ("code", "fault", "ran_over"),
     [

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("asyncua")
 
+from cnctwin.standins.opcua_server.shown import CNC
 from cnctwin.standins.simulated_control.state import ControlState
 from edge.chosen import Chosen, PlcSection, VariableSection
 from edge.config import EdgeConfig
@@ -71,6 +72,30 @@ def test_parameters_and_plc_addresses_are_read_by_configuration_in_its_units(ben
     assert rows["plc_coolant_pressure"] == (4.5, "bar", None)
     assert rows["plc_coolant"] == (True, "", None)
     assert rows["plc_no_such"] == (None, "", "BadNodeIdUnknown")
+
+
+def test_the_unit_that_the_server_states_is_converted_to_the_one_that_is_wanted_or_refuses_it(bench: Bench) -> None:
+    bench.show(ControlState(feed_mm_min=1500.0))
+    (feed,) = [node for one, node in bench.server._nodes.items() if one.path[-1] == "ActFeedrate"]  # in m/min
+    address = f"nsu={CNC};i={feed.Identifier}"
+    config = EdgeConfig(
+        source=bench.config().source,
+        variables={
+            "feed": VariableSection(address=address, unit="mm/s"),
+            "as_stated": VariableSection(address=address),
+            "scaled": VariableSection(address=address, unit="bar", scale=2.0),
+            "wrong": VariableSection(address=address, unit="bar"),
+        },
+    )
+    rows = {row.signal: (row.value, row.unit, row.native_unit) for row in describe(config)}
+    assert rows["variable_feed"] == (25.0, "mm/s", "m/min")
+    assert rows["variable_as_stated"] == (1.5, "", "m/min")
+    assert rows["variable_scaled"] == (3.0, "bar", "m/min"), "a scale says that the configuration knows better"
+    why = "variables.wrong.unit = 'bar': the control says otherwise: m/min is a speed and bar a pressure; "
+    why += "correct it, or add a scale"
+    with reading(config) as reader:
+        first = {s.signal: (s.value, s.reason) for s in reader.until(lambda one: bool(one.samples)).samples}
+    assert (first["variable_feed"], first["variable_wrong"]) == ((25.0, None), (None, why))
 
 
 @pytest.mark.parametrize(

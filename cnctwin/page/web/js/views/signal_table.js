@@ -2,8 +2,9 @@
 
 import { columnHead, el, setClass, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
-import { age, moment, plain } from "../text.js";
+import { age, moment } from "../text.js";
 import { TWIN_PREFIX } from "../vocabulary.js";
+import { worded } from "../worded.js";
 
 const LONG = 120;
 
@@ -79,7 +80,8 @@ export class SignalTable {
         this.rows.set(signal, row);
         this.body.append(row.element);
       }
-      const text = plain(held.value, held.unit);
+      const text = worded(held.value, held.unit);
+      row.value.title = text.length > LONG ? text : "";
       setText(
         row.value,
         `${text.length > LONG ? `${text.slice(0, LONG)} …` : text}${held.unit && held.value !== null ? ` ${held.unit}` : ""}`,
