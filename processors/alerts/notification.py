@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, body, iso, worst_of
+from processors.alerts.phases import flaps
 from processors.alerts.statement import Statement, statements_in
 from processors.alerts.words.wording import Occasion
 from processors.alerts.words.wordings import Alerts, wording_of
@@ -18,9 +19,12 @@ Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, clock_s: float) -> str:
     """Return the JSON of a notice with the id `key`; `Notification.of` reads it."""
-    worst = worst_of(alert for alert in notice.alerts if alert.is_on)
     words, news = wording_of(configuration, notice.receiver), len(statements_in(notice.says))
-    occasion = Occasion(clock_s, notice.kind, news)
+    worst = worst_of(
+        alert for alert in notice.alerts[: news or None] if alert.is_on
+    )  # what is over rings for nothing that stands
+    flapping = frozenset(alert.fingerprint for alert in notice.alerts if flaps(alert, clock_s, configuration.of(alert.machine)))
+    occasion = Occasion(clock_s, notice.kind, news, flapping)
     first = next((alert for alert in notice.alerts[:news] if alert.is_on), next(iter(notice.alerts), None))
     document = {
         "id": key,

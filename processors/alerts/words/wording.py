@@ -30,7 +30,7 @@ KNOWN = frozenset(
         *("severity", "is_on", "acknowledged_by", "unknown", "since", "ended", "lasting", "for_lasting", "why", "value", "limit"),
         *("unit", "lasted_s", "line", "signal", "side", "away", "away_unit", "against", "parts", "line_from", "line_to", "like"),
         *("likeness", "peers", "what_grows", "what_drifts", "left", "left_low", "left_high", "program", "tool", "control"),
-        *("control_alarm", "sentence"),
+        *("control_alarm", "sentence", "comes_and_goes"),
     }
 )
 """The names that a template may use; a language of somebody's own that uses another is refused."""
@@ -52,11 +52,13 @@ class Occasion(NamedTuple):
     """The occasion of a text.
 
     clock_s: of the state, which never goes back; kind: of the notification; news: how many of its alerts are new: the first ones
+    flapping: fingerprints of alerts that come and go
     """
 
     clock_s: float
     kind: str = "notify"
     news: int = 0
+    flapping: frozenset[str] = frozenset()
 
 
 class Wording:
@@ -151,6 +153,7 @@ class Wording:
             "details": self._details(alert, facts),
             "advice": self._texts(alert).advice,
             "link": self.link(alert),
+            "comes_and_goes": alert.is_on and alert.fingerprint in occasion.flapping,
         }
 
     def _facts(self, alert: Alert, more: Mapping[str, str]) -> dict[str, Any]:
