@@ -140,11 +140,9 @@ def _processors(
     rule, before = config.processors_behind, known.get((lag.PLANT, PROCESSORS_BEHIND))
     if rule is None:
         return
-    condition, sentence = lag.condition_of(
-        state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s
-    )
+    condition, facts = lag.condition_of(state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s)
     if condition.stands or before is not None:
-        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, {"sentence": sentence} if sentence else {})
+        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, facts)
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:
