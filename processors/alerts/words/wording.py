@@ -34,7 +34,7 @@ KNOWN = frozenset(
         *("unit", "lasted_s", "line", "signal", "side", "away", "away_unit", "against", "parts", "line_from", "line_to", "like"),
         *("likeness", "peers", "regime", "section", "way", "left", "left_low", "left_high", "program", "tool", "control", "news"),
         *("control_alarm", "fed", "busy", "runners", "partitions", "waiting", "processors", "remedy"),
-        *("times", "within", "stays_away"),
+        *("times", "within", "stays_away", "away_for"),
     }
 )
 """The names that a template may use; a language of somebody's own that uses another is refused."""
@@ -166,7 +166,7 @@ class Wording:
         more["news"] = news.get((alert.fingerprint, alert.episode), "")
         if alert.is_on and (flapping := occasion.flapping.get(alert.fingerprint)) is not None:
             more |= {"times": flapping.times, "within": self._duration(flapping.within_s)}
-            more["stays_away"] = self._duration(flapping.stays_away_s)
+            more |= {"stays_away": self._duration(flapping.stays_away_s), "away_for": self._duration(alert.clear_s)}
         facts = self._facts(alert, more)
         return facts | {
             "what": self._what(alert, facts),
@@ -179,7 +179,6 @@ class Wording:
         """Return what templates may say of an alert; `for_lasting` is empty where nothing is known of its duration."""
         words = self._words
         told = str(alert.facts.get("signal", alert.signal) or alert.name)
-        before_ms = round(_before_s(alert) * 1000)
         facts: dict[str, Any] = {
             **alert.facts,
             "machine": alert.machine,
@@ -190,7 +189,7 @@ class Wording:
             "is_on": alert.is_on or alert.phase is Phase.PENDING,
             "acknowledged_by": alert.acknowledged_by,
             "unknown": words.reasons.get(alert.unknown, alert.unknown),
-            "since": self._moment(alert.episode - before_ms),
+            "since": self._moment(began_ms(alert)),
             "ended": "" if alert.is_on or not alert.ended_ms else self._moment(max(alert.ended_ms, alert.episode)),
             **more,
         }
@@ -259,6 +258,11 @@ def lasted_s(alert: Alert, occasion: Occasion) -> float | None:
     if alert.is_on:
         return before_s + alert.held_s + max(0.0, occasion.clock_s - alert.fired_s)
     return before_s + (alert.ended_ms - alert.episode) / 1000.0 if alert.ended_ms else None
+
+
+def began_ms(alert: Alert) -> int:
+    """Return when it began to be so, which may be before it became an alert."""
+    return alert.episode - round(_before_s(alert) * 1000)
 
 
 def _before_s(alert: Alert) -> float:
