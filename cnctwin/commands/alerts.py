@@ -156,12 +156,14 @@ def _show(state: Mapping[str, Any]) -> None:
     over = [alert for alert in state.get("alerts", ()) if alert.get("phase") == "resolved"]
     if over:
         latest = sorted(over, key=lambda alert: str(alert["endsAt"]), reverse=True)[:OVER_SHOWN_MAX]
+        console.print()
         console.print(text_table(OVER_COLUMNS, map(_over_row, latest)))
     for one in state.get("silences", ()):
         what = ", ".join(f"{name} {pattern}" for name, pattern in one["matchers"].items())
         line = f"silence {one['id']}: {what}, until {one['ends'][:19]} by {one['by']} {one['comment']}".rstrip()
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if state.get("receivers"):
+        console.print()
         rows = (_receiver_row(name, known) for name, known in state["receivers"].items())
         console.print(text_table(RECEIVER_COLUMNS, rows))
 
