@@ -63,7 +63,7 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
         else:
             overflowed += 1
         if alert is not None and one.facts is not None:
-            if before is None or before.phase is not alert.phase:
+            if one.facts and (before is None or before.phase is not alert.phase):  # an end keeps those of its beginning
                 alert = replace(alert, facts=one.facts)
         elif alert is not None and (before is None or before.episode != alert.episode):
             alert = replace(alert, facts=facts_of(one.signal, cell.get(one.machine, {}), alert.episode))

@@ -61,6 +61,7 @@ def test_it_is_over_when_all_have_caught_up_for_a_minute_and_that_is_one_notific
     behind(shop, 400, 0.0)
     assert shop.alert(NAME, PLANT)["phase"] == "resolved"
     assert [told.news for told in shop.told] == [["firing"], ["resolved"]]
+    assert shop.told[1].text.startswith("20 machines, 105 % of one core, processor thermal\nFrom ")
 
 
 @pytest.mark.parametrize(("seconds", "lag_s"), [(25, 60.0), (600, 4.9)])

@@ -129,13 +129,16 @@ TOLD: list[tuple[str, Facts, tuple[str, str], tuple[str, str]]] = [
     (
         "gap_growing",
         gap(signal="spindle_load_pct", regime="cutting O1701", way="up", amount=6.0, unit="%"),
-        ("Spindle load drifts away from the twin for 3 d: 6 % higher than while healthy", "in the cut, program O1701"),
+        ("Spindle load has been drifting away from the twin for 3 d: 6 % higher than while healthy", "in the cut, program O1701"),
         ("Spindellast entfernt sich seit 3 d vom Zwilling: 6 % höher als in gesundem Zustand", "im Schnitt, Programm O1701"),
     ),
     (
         "gap_growing",
         gap(signal="program_time_s", regime="section 3 of O1701", way="down", amount=0.0, unit="s"),
-        ("Time of a program section drifts away from the twin for 3 d: lower than while healthy", "section 3, program O1701"),
+        (
+            "Time of a program section has been drifting away from the twin for 3 d: lower than while healthy",
+            "section 3, program O1701",
+        ),
         (
             "Dauer eines Programmabschnitts entfernt sich seit 3 d vom Zwilling: niedriger als in gesundem Zustand",
             "Abschnitt 3, Programm O1701",
@@ -144,19 +147,22 @@ TOLD: list[tuple[str, Facts, tuple[str, str], tuple[str, str]]] = [
     (
         "gap_growing",
         gap(signal="spindle_temp_c", regime="steady", way="scatter"),
-        ("Spindle temperature scatters more about the twin than while healthy for 3 d", "in steady running"),
+        ("Spindle temperature has scattered more about the twin than while healthy for 3 d", "in steady running"),
         ("Spindeltemperatur streut seit 3 d stärker um den Zwilling als in gesundem Zustand", "im gleichmäßigen Betrieb"),
     ),
     (
         "gap_growing",
         gap(signal="spindle_rpm", regime="turning", way="up", amount=40.0, unit="rev/min"),
-        ("Spindle speed drifts away from the twin for 3 d: 40 rev/min higher than while healthy", "while the spindle turns"),
+        (
+            "Spindle speed has been drifting away from the twin for 3 d: 40 rev/min higher than while healthy",
+            "while the spindle turns",
+        ),
         ("Spindeldrehzahl entfernt sich seit 3 d vom Zwilling: 40 U/min höher als in gesundem Zustand", "bei drehender Spindel"),
     ),
     (
         "machine_drift",
         seen("machine_drift", **{twin_signals.MACHINE_DRIFT_FINDINGS: {"since": AT_MS - DAYS_MS, "pct": -4.2}, "tool_number": 3}),
-        ("Load of all tools and programs 4.2 % lower than at first for 3 d", "not one tool and not one batch alone"),
+        ("Load of all tools and programs has been 4.2 % lower than at first for 3 d", "not one tool and not one batch alone"),
         (
             "Last aller Werkzeuge und Programme seit 3 d um 4,2 % niedriger als am Anfang",
             "nicht nur ein Werkzeug, nicht nur ein Los",
@@ -165,7 +171,7 @@ TOLD: list[tuple[str, Facts, tuple[str, str], tuple[str, str]]] = [
     (
         "score_drift",
         {},
-        ("Scores drift for 9 s: the model no longer fits the machine", ""),
+        ("Scores have drifted for 9 s: the model no longer fits the machine", ""),
         ("Bewertung driftet seit 9 s: Das Modell passt nicht mehr zur Maschine", ""),
     ),
     (
@@ -254,6 +260,13 @@ def test_an_alarm_is_told_in_the_readers_language_from_its_values(
 ) -> None:
     for language, (title, details) in {"en": english, "de": german}.items():
         assert told(name, facts, language) == (f"okuma: {title}", details)
+
+
+def test_an_end_names_the_signal_where_the_name_of_the_alert_does_not() -> None:
+    facts = of_score({"signal": "axis_z_load_pct", "measured": 59.0, "expected": 50.0})
+    over = Alert("okuma", "anomaly_alarm", "", "f" * 16, Severity.LOW, AT_MS, Phase.RESOLVED, ended_ms=AT_MS + 9000, facts=facts)
+    assert wording("en", "UTC", "").summary(over) == "Over after 9 s: machine behaves unusually (load of axis Z)"
+    assert wording("de", "UTC", "").summary(over) == "Vorbei nach 9 s: Maschine verhält sich ungewöhnlich (Last der Achse Z)"
 
 
 @pytest.mark.parametrize("found", ["", "7", "[7]", "{}", "[{}]", '[{"signal": 7, "way": null, "amount": "x", "since": 1e300}]'])
