@@ -21,6 +21,7 @@ from twin.vocabulary import twin_signals
 ALARMS = "alarms"
 ALARM, TEXT = twin_signals.CONTROL_ALARM, twin_signals.CONTROL_ALARM_TEXT
 NONE, SHOWN_MAX, LENGTH_MAX = "none", 3, 300
+NO_TEXT = "an alarm without a text"
 
 
 class Config(ProcessorConfig):
@@ -51,7 +52,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     counting = [alarm for alarm in listed if counts(config, alarm)]
     texts = [_text(alarm) for alarm in counting[:SHOWN_MAX]]
     if len(counting) > SHOWN_MAX:
-        texts.append(f"{len(counting) - SHOWN_MAX} more")
+        texts[-1] += f" (+{len(counting) - SHOWN_MAX})"
     return state, (Output(ALARM, bool(counting)), Output(TEXT, "; ".join(texts)[:LENGTH_MAX] or NONE))
 
 
@@ -87,7 +88,7 @@ def _listed(value: object) -> list[Mapping[str, Any]] | None:
 
 def _text(alarm: Mapping[str, Any]) -> str:
     said = (alarm.get("code"), alarm.get("text"))
-    return " ".join(" ".join(str(one).split()) for one in said if one is not None)[:LENGTH_MAX] or "an alarm without a text"
+    return " ".join(" ".join(str(one).split()) for one in said if one is not None)[:LENGTH_MAX] or NO_TEXT
 
 
 def _null(reason: str) -> tuple[Output, ...]:

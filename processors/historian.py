@@ -22,6 +22,7 @@ from twin.vocabulary import twin_signals
 
 PINS, REASON, WINDOW = "twin/history_pins", "twin/history_pin_reason", twin_signals.GAP_WINDOW
 DAY_MS = 86_400_000
+LONGER_MS_MIN = 60_000
 _DATA, _BIRTH = SampleKind.DATA, SampleKind.BIRTH
 
 
@@ -54,14 +55,24 @@ class Risen:
 
 
 @dataclass(frozen=True, slots=True)
+class Stretch:
+    """The stretch that was pinned last, with all that overlapped it."""
+
+    from_ms: int
+    to_ms: int
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class HistorianState:
-    """The flags that stand; how many stretches were pinned, in all and on the day that is counted."""
+    """The flags that stand; how many stretches were pinned, in all and on the day that is counted; the last of them."""
 
     risen: tuple[Risen, ...] = ()
     pins: int = 0
     day: int = 0
     pins_of_day: int = 0
     window: str = ""
+    last: Stretch | None = None
 
 
 def step(config: HistorianConfig, state: HistorianState, sample: Sample) -> tuple[HistorianState, Sequence[Output | Pin]]:
@@ -115,20 +126,49 @@ def _see_window(state: HistorianState, machine: str, reading: Reading, pins: lis
 def _counted(
     config: HistorianConfig, state: HistorianState, pins: Sequence[Pin]
 ) -> tuple[HistorianState, Sequence[Output | Pin]]:
-    """No more than a day may have; the last one is told."""
-    day = max(pin.to_ms for pin in pins) // DAY_MS
-    used = state.pins_of_day if day == state.day else 0
-    taken = pins[: max(config.pins_a_day_max - used, 0)]
-    counted = replace(state, pins=state.pins + len(taken), day=day, pins_of_day=used + len(pins))
-    if not taken:
+    """Pin what is not pinned yet: what goes on with the last stretch always, others no more often than a day may have."""
+    taken: list[Pin] = []
+    is_refused = False
+    for pin in pins:
+        last = state.last
+        if last is not None and last.from_ms <= pin.to_ms and pin.from_ms <= last.to_ms:
+            state, longer = _gone_on(config, state, last, pin)
+            taken += longer
+            continue
+        day = pin.to_ms // DAY_MS
+        used = state.pins_of_day if day == state.day else 0
+        state = replace(state, day=day, pins_of_day=used + 1)
+        if used >= config.pins_a_day_max:
+            is_refused = True
+            continue
+        state = replace(state, pins=state.pins + 1, last=Stretch(pin.from_ms, pin.to_ms, (pin.reason,)))
+        taken.append(pin)
+    if taken:
+        return state, [*taken, Output(PINS, state.pins), Output(REASON, taken[-1].reason)]
+    if is_refused:
         too_many = f"more than {config.pins_a_day_max} stretches a day are asked for: the rest is not pinned"
-        return counted, [Output(REASON, too_many, Quality.BAD)]
-    return counted, [*taken, Output(PINS, counted.pins), Output(REASON, taken[-1].reason)]
+        return state, [Output(REASON, too_many, Quality.BAD)]
+    return state, ()
+
+
+def _gone_on(config: HistorianConfig, state: HistorianState, last: Stretch, pin: Pin) -> tuple[HistorianState, Sequence[Pin]]:
+    """Return the last stretch with a pin that overlaps it, and the pin where it adds something.
+
+    A stretch that grows does so by `LONGER_MS_MIN` at least, so that a flag that flaps sets few pins however often it does.
+    """
+    is_within = last.from_ms <= pin.from_ms and pin.to_ms <= last.to_ms
+    if is_within and pin.reason in last.reasons:
+        return state, ()
+    if pin.to_ms > last.to_ms:
+        pin = pin._replace(to_ms=max(pin.to_ms, last.to_ms + min(LONGER_MS_MIN, round(config.pin_after_s * 1000))))
+    reasons = last.reasons if pin.reason in last.reasons else (*last.reasons, pin.reason)
+    longer = Stretch(min(last.from_ms, pin.from_ms), max(last.to_ms, pin.to_ms), reasons)
+    return replace(state, last=longer), (pin,)
 
 
 PROCESSOR = Processor(
     name="historian",
-    version=1,
+    version=2,
     inputs=None,
     outputs=(
         OutputSpec(PINS, DataType.INT64, "stretches", "stretches of raw data that no sweep may take", Provenance.INFERRED),

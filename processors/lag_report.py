@@ -7,6 +7,7 @@ topic, `cnctwin/lag/<processor>`, once a second, not retained, and once more whe
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Annotated
 
 from pydantic import Field, TypeAdapter
@@ -23,6 +24,14 @@ TEXT_MAX = 4000
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
 _Count = Annotated[int, Field(ge=0, le=2**62)]
 _Amount = Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)]
+
+
+class Remedy(Enum):
+    """The way out for a process that is behind: more cores, one more runner, or time on the core that it has."""
+
+    CORE = "core"
+    RUNNER = "runner"
+    ELSEWHERE = "elsewhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +61,19 @@ class LagReport:
         >>> LagReport(("thermal",), "kafka: thermal", 0, 18.2, 20, 98.0, 2, 12, 40_213).load
         '20 machines, 40213 records wait, 2 runners with 12 partitions, the busiest 98 % busy'
         """
+        machines = _counted(self.machines, "machine")
         if not self.runners:
-            return f"{self.machines} machines, one core, {self.busy_pct:.0f} % busy"
-        runners = f"{self.runners} runner{'s' if self.runners > 1 else ''} with {self.partitions} partitions"
-        return f"{self.machines} machines, {self.waiting} records wait, {runners}, the busiest {self.busy_pct:.0f} % busy"
+            return f"{machines}, one core, {self.busy_pct:.0f} % busy"
+        waiting = f"{self.waiting} {'record waits' if self.waiting == 1 else 'records wait'}"
+        runners = f"{_counted(self.runners, 'runner')} with {_counted(self.partitions, 'partition')}"
+        return f"{machines}, {waiting}, {runners}, the busiest {self.busy_pct:.0f} % busy"
+
+    @property
+    def remedy(self) -> Remedy:
+        """The way out."""
+        if self.busy_pct < BUSY_PCT:
+            return Remedy.ELSEWHERE
+        return Remedy.RUNNER if self.runners else Remedy.CORE
 
     @property
     def sentence(self) -> str:
@@ -64,13 +82,12 @@ class LagReport:
         >>> LagReport(("thermal", "mirror"), "hall-3:4711", 0, 18.2, 20, 104.8).sentence
         'processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes (mirror, thermal)'
         """
-        if self.busy_pct < BUSY_PCT:
-            elsewhere = "the log" if self.runners else "the broker"
-            way_out = f"that is less than a core: look at what else runs there, and at {elsewhere}"
-        elif self.runners:
-            way_out = "start one more with the same processors (no more of them than partitions)"
-        else:
-            way_out = "`cnctwin plan fleet` says what it takes"
+        elsewhere = "the log" if self.runners else "the broker"
+        way_out = {
+            Remedy.ELSEWHERE: f"that is less than a core: look at what else runs there, and at {elsewhere}",
+            Remedy.RUNNER: "start one more with the same processors (no more of them than partitions)",
+            Remedy.CORE: "`cnctwin plan fleet` says what it takes",
+        }[self.remedy]
         return f"processors are {self.lag_s:.0f} s behind: {self.load}; {way_out} ({', '.join(sorted(self.processors))})"
 
     def payload(self) -> bytes:
@@ -79,6 +96,10 @@ class LagReport:
 
 
 _ADAPTER = TypeAdapter(LagReport)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def parsed(text: str) -> LagReport:

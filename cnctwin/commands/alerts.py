@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import typer
@@ -21,7 +22,9 @@ from cnctwin.terminal.table import text_table
 TEST_S_MAX = 30.0
 ID_SHOWN = 8
 TABLE_WIDTH = 140
-ALERT_COLUMNS = ("", "severity", "machine", "alert", "state", "since (UTC)", "told", "by")
+OVER_SHOWN_MAX = 20
+ALERT_COLUMNS = ("", "severity", "alert", "state", "since (UTC)", "for", "told", "by")
+OVER_COLUMNS = ("", "severity", "alert", "from (UTC)", "to (UTC)")
 RECEIVER_COLUMNS = ("receiver", "delivered", "failed", "waiting", "held back", "last error")
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)([smhd]?)")
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -34,7 +37,10 @@ Comment = Annotated[str, typer.Option(help="Why")]
 
 @alerts_app.command("list")
 def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False) -> None:
-    """All alerts, silences and receivers. Exit code 1: something fires that nobody has acknowledged."""
+    """What fires and what is over, in the words of its notification; silences and receivers.
+
+    Exit code 1: something fires that nobody has acknowledged.
+    """
     with alert_desk(address(broker), wait_s) as desk:
         state = desk.state
         if as_json:
@@ -147,23 +153,50 @@ def _show(state: Mapping[str, Any]) -> None:
         console.print(text_table(ALERT_COLUMNS, map(_alert_row, alerts)))
     else:
         console.print("no alert fires")
+    over = [alert for alert in state.get("alerts", ()) if alert.get("phase") == "resolved"]
+    if over:
+        latest = sorted(over, key=lambda alert: str(alert["endsAt"]), reverse=True)[:OVER_SHOWN_MAX]
+        console.print()
+        console.print(text_table(OVER_COLUMNS, map(_over_row, latest)))
     for one in state.get("silences", ()):
         what = ", ".join(f"{name} {pattern}" for name, pattern in one["matchers"].items())
         line = f"silence {one['id']}: {what}, until {one['ends'][:19]} by {one['by']} {one['comment']}".rstrip()
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if state.get("receivers"):
+        console.print()
         rows = (_receiver_row(name, known) for name, known in state["receivers"].items())
         console.print(text_table(RECEIVER_COLUMNS, rows))
 
 
 def _alert_row(alert: Mapping[str, Any]) -> list[str]:
-    notes = [name for name, is_so in (("flaps", alert["flapping"]), ("unknown", alert["unknown"])) if is_so]
+    notes = [name for name, is_so in (("comes and goes", alert["flapping"]), ("unknown", alert["unknown"])) if is_so]
     notes += [f"silenced {alert['silenced_by']}"] if alert["silenced_by"] else []
     notes += ["UNDELIVERED"] if alert["undelivered"] else []
     phase = ", ".join([alert["phase"], *notes])
-    labels = alert["labels"]
-    row = (alert["fingerprint"][:ID_SHOWN], alert["severity"], labels["machine"], labels["alertname"], phase)
-    return [*row, alert["startsAt"][:19], ", ".join(alert["told"]), alert["acknowledged_by"]]
+    row = (*_named(alert), phase, _moment(alert["began"]), _lasting(alert["began"]))
+    return [*row, ", ".join(alert["told"]), alert["acknowledged_by"]]
+
+
+def _over_row(alert: Mapping[str, Any]) -> list[str]:
+    return [*_named(alert), _moment(alert["began"]), _moment(alert["endsAt"])]
+
+
+def _named(alert: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Return the beginning of the fingerprint, the severity, and the first line of a notification over the alert's name."""
+    words = f"{alert['annotations']['summary']}\n{alert['labels']['alertname']}"
+    return alert["fingerprint"][:ID_SHOWN], alert["severity"], words
+
+
+def _moment(text: str) -> str:
+    return text[:19].replace("T", " ")
+
+
+def _lasting(began: str) -> str:
+    from processors.alerts.words.language import ENGLISH, language
+    from processors.alerts.words.wording import duration
+
+    seconds = (datetime.now(UTC) - datetime.fromisoformat(began)).total_seconds()
+    return duration(seconds, language(ENGLISH).form)
 
 
 def _receiver_row(name: str, known: Mapping[str, Any]) -> list[str]:

@@ -1,9 +1,13 @@
 """The facts of an alert: what the machine's row says of it when it begins, as plain values that a text can be filled with.
 
-    value, limit, unit      of a rule, as of the moment it was raised; signal: the one to look at; lasted_s: how long that had
-                            lasted by then; line: of the NC
+    value, limit, unit      of a rule, as of the moment it was raised; signal: the one to look at; line: of the NC
+    lasted_s                how long it had been so by the time it became an alert
     signal, away, …         of a score: how far which signal is from what, in which lines, like what, and how many peers show it
-    what_grows, …           a sentence that the processor publishes itself
+    signal, regime, away, … of a gap that grows: how far which signal is from where it was, in which regime; way: it scatters
+                            or has gone up or down
+    away, way               of a drift: by how many per cent the load has gone up or down
+    value, left, …          of tool wear: load over a sharp one, parts left; tool: the one that wears fast
+    value, limit, fed, …    of processors that are behind (processors/alerts/lag.py)
     program, tool           what the machine was doing; control: the alarm that the control itself shows then
 
 What is not known is left out. Nothing is taken from a reading that is not good.
@@ -14,6 +18,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from processors.control_alarms import NO_TEXT, NONE
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
@@ -21,27 +26,28 @@ from twin.vocabulary import twin_signals
 PROGRAM, TOOL, CONTROL_ALARM = "program", "tool_number", "alarm"
 INPUTS = frozenset(
     {
-        *(PROGRAM, TOOL, CONTROL_ALARM, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_GROWING_SIGNAL),
-        *(twin_signals.TOOL_WEAR_PCT, twin_signals.TOOL_PARTS_LEFT, twin_signals.TOOL_PARTS_LEFT_LOW),
-        *(twin_signals.TOOL_PARTS_LEFT_HIGH, twin_signals.MACHINE_DRIFT_BASIS, twin_signals.CONTROL_ALARM_TEXT),
+        *(PROGRAM, TOOL, CONTROL_ALARM, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_FINDINGS),
+        *(twin_signals.TOOL_LIVES, twin_signals.MACHINE_DRIFT_FINDINGS, twin_signals.CONTROL_ALARM_TEXT),
     }
 )
+PARSED = frozenset(
+    {
+        *(twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_FINDINGS, twin_signals.TOOL_LIVES),
+        twin_signals.MACHINE_DRIFT_FINDINGS,
+    }
+)
+"""Signals whose text is JSON: read as a whole, and not shown."""
 TEXT_MAX = 300
 DIFFERENCES = ("K", "°C")
 """Units whose values are subtracted: a temperature has no ratio."""
 PCT_MAX = 200.0
+OF_WEEKS = frozenset(
+    {twin_signals.GAP_GROWING, twin_signals.TOOL_WEARS_FAST, twin_signals.MACHINE_DRIFT, twin_signals.SCORE_DRIFT}
+)
+"""Alarms of what builds up over hours to weeks: what the machine does when they ring says nothing about them."""
 Fact = str | int | float
 Facts = dict[str, Fact]
 Row = Mapping[str, Reading]
-_SENTENCES = {twin_signals.GAP_GROWING: ("what_grows", twin_signals.GAP_GROWING_SIGNAL)} | {
-    twin_signals.MACHINE_DRIFT: ("what_drifts", twin_signals.MACHINE_DRIFT_BASIS)
-}
-_WEAR = {
-    "value": twin_signals.TOOL_WEAR_PCT,
-    "left": twin_signals.TOOL_PARTS_LEFT,
-    "left_low": twin_signals.TOOL_PARTS_LEFT_LOW,
-    "left_high": twin_signals.TOOL_PARTS_LEFT_HIGH,
-}
 
 
 def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
@@ -51,18 +57,21 @@ def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
         facts |= _of_rule(signal.removeprefix(twin_signals.RULE_PREFIX), row, at_ms)
     elif signal == twin_signals.ANOMALY_ALARM:
         facts |= of_score(_object(_text(row, twin_signals.ANOMALY_WHY)))
-    elif signal == twin_signals.TOOL_WEARS_FAST:
-        numbers = {name: _number(_value(row, metric)) for name, metric in _WEAR.items()}
-        facts |= {name: number for name, number in numbers.items() if number is not None}
     elif signal == twin_signals.CONTROL_ALARM:
-        facts["control_alarm"] = _text(row, twin_signals.CONTROL_ALARM_TEXT)
-    elif signal in _SENTENCES:
-        name, metric = _SENTENCES[signal]
-        facts[name] = _text(row, metric)
-    facts |= {"program": _text(row, PROGRAM), "tool": _text(row, TOOL), "control": _text(row, CONTROL_ALARM)}
+        shown = _text(row, twin_signals.CONTROL_ALARM_TEXT)
+        facts["control_alarm"] = "" if shown in (NONE, NO_TEXT) else shown
+    elif signal == twin_signals.GAP_GROWING:
+        facts |= _of_gap(_first(_text(row, twin_signals.GAP_FINDINGS)), at_ms)
+    elif signal == twin_signals.TOOL_WEARS_FAST:
+        facts |= _of_wear(_text(row, twin_signals.TOOL_LIVES))
+    elif signal == twin_signals.MACHINE_DRIFT:
+        facts |= _of_drift(_object(_text(row, twin_signals.MACHINE_DRIFT_FINDINGS)), at_ms)
+    doing: Facts = {"program": _text(row, PROGRAM), "tool": _text(row, TOOL), "control": _text(row, CONTROL_ALARM)}
     if signal == twin_signals.CONTROL_ALARM:
-        del facts["control"]  # its own sentence says it
-    return {name: fact for name, fact in facts.items() if fact != ""}
+        del doing["control"]  # its own sentence says it
+    if signal in OF_WEEKS:
+        doing |= {"program": "", "tool": ""}
+    return {name: fact for name, fact in (doing | facts).items() if fact != ""}
 
 
 def _of_rule(rule: str, row: Row, at_ms: int) -> Facts:
@@ -74,10 +83,42 @@ def _of_rule(rule: str, row: Row, at_ms: int) -> Facts:
         if (number := _number(found.get(name))) is not None:
             facts[name] = number
     facts |= {"unit": _clean(found.get("unit")), "signal": _clean(found.get("signal"))}
+    return facts | _lasted(found, at_ms)
+
+
+def _of_gap(found: Mapping[str, Any], at_ms: int) -> Facts:
+    """Return the facts of one of `twin/gap_findings`; its regime may name a program, as "cutting O1701", "section 3 of O1701"."""
+    regime, _, of = _clean(found.get("regime")).partition(" ")
+    section, _, program = of.rpartition(" of ") if regime == "section" else ("", "", of)
+    facts: Facts = {"signal": _clean(found.get("signal")), "way": _clean(found.get("way"))}
+    facts |= {"regime": regime, "section": section, "program": program}
+    if amount := _number(found.get("amount")):
+        facts |= {"away": amount, "away_unit": _clean(found.get("unit"))}
+    return facts | _lasted(found, at_ms)
+
+
+def _of_drift(found: Mapping[str, Any], at_ms: int) -> Facts:
+    pct = _number(found.get("pct"))
+    if pct is None:
+        return {}
+    return {"way": "up" if pct >= 0.0 else "down", "away": abs(pct), "away_unit": "%"} | _lasted(found, at_ms)
+
+
+def _of_wear(lives: str) -> Facts:
+    """Return the facts of the tool that wears fast, by `twin/tool_lives`; of several, of the one that is worn most."""
+    fast = [one for one in _listed(lives) if one.get("is_fast") is True]
+    worst = max(fast, key=lambda one: _number(one.get("wear_pct")) or 0.0, default={})
+    band = worst.get("parts_left_band")
+    low, high = band if isinstance(band, list) and len(band) == 2 else (None, None)
+    found = {"value": worst.get("wear_pct"), "left": worst.get("parts_left"), "left_low": low, "left_high": high}
+    facts: Facts = {name: number for name, value in found.items() if (number := _number(value)) is not None}
+    return facts | {"tool": _clean(worst.get("tool"))}
+
+
+def _lasted(found: Mapping[str, Any], at_ms: int) -> Facts:
+    """Return how long it had been so when it became an alert."""
     since_ms = _number(found.get("since"))
-    if since_ms is not None and since_ms <= at_ms:
-        facts["lasted_s"] = (at_ms - since_ms) / 1000.0
-    return facts
+    return {} if since_ms is None or since_ms > at_ms else {"lasted_s": (at_ms - since_ms) / 1000.0}
 
 
 def of_score(why: Mapping[str, Any]) -> Facts:
@@ -136,8 +177,8 @@ def _value(row: Row, name: str) -> Any:
 
 def _text(row: Row, name: str) -> str:
     value = _value(row, name)
-    if isinstance(value, str) and name in (twin_signals.RULE_FINDINGS, twin_signals.ANOMALY_WHY):
-        return value  # parsed, not shown
+    if isinstance(value, str) and name in PARSED:
+        return value
     return _clean(value)
 
 
@@ -149,11 +190,24 @@ def _clean(value: Any) -> str:
 
 
 def _object(text: str) -> Mapping[str, Any]:
-    try:
-        found = json.loads(text) if text else {}
-    except (ValueError, RecursionError):
-        return {}
+    found = _parsed(text)
     return found if isinstance(found, dict) else {}
+
+
+def _listed(text: str) -> list[Mapping[str, Any]]:
+    found = _parsed(text)
+    return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+
+
+def _first(text: str) -> Mapping[str, Any]:
+    return next(iter(_listed(text)), {})
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        return None
 
 
 def _number(value: Any) -> float | None:

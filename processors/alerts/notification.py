@@ -8,8 +8,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, body, iso, worst_of
+from processors.alerts.phases import flaps, rises_lately_s
 from processors.alerts.statement import Statement, statements_in
-from processors.alerts.words.wording import Occasion
+from processors.alerts.words.wording import Flapping, Occasion
 from processors.alerts.words.wordings import Alerts, wording_of
 
 SAYS_MAX, SAYS_CHARACTERS_MAX = 5000, 200
@@ -18,10 +19,11 @@ Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, clock_s: float) -> str:
     """Return the JSON of a notice with the id `key`; `Notification.of` reads it."""
-    worst = worst_of(alert for alert in notice.alerts if alert.is_on)
-    words, news = wording_of(configuration, notice.receiver), len(statements_in(notice.says))
-    occasion = Occasion(clock_s, notice.kind, news)
-    first = next((alert for alert in notice.alerts[:news] if alert.is_on), next(iter(notice.alerts), None))
+    words = wording_of(configuration, notice.receiver)
+    occasion = Occasion(clock_s, notice.kind, statements_in(notice.says), _flapping(notice, configuration, clock_s))
+    new = notice.alerts[: len(occasion.says)]  # the rest stands only: an end rings for nothing of it
+    worst = worst_of(alert for alert in new if alert.is_on)
+    first = next((alert for alert in new if alert.is_on), next(iter(notice.alerts), None))
     document = {
         "id": key,
         "receiver": notice.receiver,
@@ -37,6 +39,17 @@ def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, cloc
         "body": body(notice, configuration, words),
     }
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False)
+
+
+def _flapping(notice: Notice, configuration: Alerts, clock_s: float) -> dict[str, Flapping]:
+    """Return how often those of its alerts that flap have fired lately, by fingerprint."""
+    found = {}
+    for alert in notice.alerts:
+        config = configuration.of(alert.machine)
+        if flaps(alert, clock_s, config):
+            rises_s = rises_lately_s(alert, clock_s, config)
+            found[alert.fingerprint] = Flapping(len(rises_s), clock_s - rises_s[0], config.flap_keep_firing_for_s)
+    return found
 
 
 class _Model(BaseModel):

@@ -124,8 +124,12 @@ def caught_up(alert: Alert, severity: Severity, episode: int, ended_ms: int | No
 
 def flaps(alert: Alert, clock_s: float, config: AlertsConfig) -> bool:
     """Return True if it has fired so often lately that each firing is no news."""
-    lately = sum(clock_s - rise_s <= config.flap_window_s for rise_s in alert.rises_s)
-    return lately >= config.flap_episodes
+    return len(rises_lately_s(alert, clock_s, config)) >= config.flap_episodes
+
+
+def rises_lately_s(alert: Alert, clock_s: float, config: AlertsConfig) -> tuple[float, ...]:
+    """Return when it fired within `flap_window_s`, or would have but for being kept firing, the first time first."""
+    return tuple(rise_s for rise_s in alert.rises_s if clock_s - rise_s <= config.flap_window_s)
 
 
 def keep_firing_for_s(alert: Alert, rule: Rule, clock_s: float, config: AlertsConfig) -> float:

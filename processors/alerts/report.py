@@ -11,7 +11,7 @@ from processors.alerts.config import AlertsConfig
 from processors.alerts.notices import silenced_alerts
 from processors.alerts.phases import flaps
 from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Silence
-from processors.alerts.words.wording import Wording
+from processors.alerts.words.wording import Wording, began_ms
 from processors.alerts.words.wordings import wording_of
 from processors.config import Configuration
 from processors.contract import Output, PlainOutput
@@ -122,6 +122,7 @@ def _alert(alert: Alert, config: AlertsConfig, state: AlertsState, words: Wordin
         "severities": [severity.value for severity in alert.severities],
         "episode": alert.episode,
         "since": _wall(alert.since_wall_s),
+        "began": iso(began_ms(alert)),
         "unknown": alert.unknown,
         "flapping": flaps(alert, state.clock_s, config),
         "acknowledged_by": alert.acknowledged_by,

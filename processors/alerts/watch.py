@@ -63,7 +63,7 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
         else:
             overflowed += 1
         if alert is not None and one.facts is not None:
-            if before is None or before.phase is not alert.phase:
+            if one.facts and (before is None or before.phase is not alert.phase):  # an end keeps those of its beginning
                 alert = replace(alert, facts=one.facts)
         elif alert is not None and (before is None or before.episode != alert.episode):
             alert = replace(alert, facts=facts_of(one.signal, cell.get(one.machine, {}), alert.episode))
@@ -140,11 +140,9 @@ def _processors(
     rule, before = config.processors_behind, known.get((lag.PLANT, PROCESSORS_BEHIND))
     if rule is None:
         return
-    condition, sentence = lag.condition_of(
-        state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s
-    )
+    condition, facts = lag.condition_of(state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s)
     if condition.stands or before is not None:
-        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, {"sentence": sentence} if sentence else {})
+        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, facts)
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:

@@ -1,21 +1,23 @@
 """The published figures: standing figures, growth, what stands open, the window to diagnose, and the basis of it all."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Any
 
 from processors.contract import Output
 from processors.gap.cell import Cell
 from processors.gap.described import Given
 from processors.gap.growth import BLOCKS_MIN
-from processors.gap.signals import GAP, LOAD, NAMES, REGIMES, SIGNALS, TEMPERATURE, TOOL_CHANGE
+from processors.gap.signals import GAP, LOAD, NAMES, REGIMES, RESOLUTIONS, SIGNALS, TEMPERATURE, TOOL_CHANGE, UNITS
 from processors.gap.state import State, cells_of, floor_of, healthy_s
 from processors.gap.watch import ToolChange
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
-GROWING, GROWING_SIGNAL = twin_signals.GAP_GROWING, twin_signals.GAP_GROWING_SIGNAL
+GROWING, GROWING_SIGNAL, FINDINGS = twin_signals.GAP_GROWING, twin_signals.GAP_GROWING_SIGNAL, twin_signals.GAP_FINDINGS
 OPEN, WINDOW = twin_signals.GAP_OPEN, twin_signals.GAP_WINDOW
 BASIS, LEFT_OUT = twin_signals.GAP_BASIS, twin_signals.GAP_LEFT_OUT_PCT
 NONE = "none"
@@ -60,7 +62,8 @@ def outputs(given: Given, state: State, missing: Mapping[str, str], at_s: float)
     else:
         found.append(Output.null(GROWING, _why_not_judged(given, state, at_s)))
     said = "; ".join(_growth_in_words(key, cells[key]) for key in growing[:SHOWN_MAX])
-    found += [Output(GROWING_SIGNAL, said or NONE), Output(OPEN, _open_in_words(given, state, at_s))]
+    findings = json.dumps([_finding(key, cells[key]) for key in growing[:SHOWN_MAX]])
+    found += [Output(GROWING_SIGNAL, said or NONE), Output(FINDINGS, findings), Output(OPEN, _open_in_words(given, state, at_s))]
     found += [Output(WINDOW, _window(given, state, growing)), Output(BASIS, _basis(given, state, at_s))]
     return [*found, Output(LEFT_OUT, round(100.0 * state.left_out, 1))]
 
@@ -115,6 +118,21 @@ def _growth_in_words(key: str, cell: Cell) -> str:
     if not chart.grows:
         return f"{signal} in {regime}: scatter has grown since {_iso(cell.spread_chart.since_s)}"
     return f"{signal} in {regime}: twin minus measured has {'risen' if chart.grows > 0 else 'fallen'} since {_iso(chart.since_s)}"
+
+
+def _finding(key: str, cell: Cell) -> dict[str, Any]:
+    """Return a growth in values: by how much the measurement has gone up or down against the twin since it was healthy.
+
+    The amount is rounded as a control shows the signal, so that it is not published again at each change; a scatter has none.
+    """
+    signal, _, regime = key.partition("/")
+    chart = cell.level_chart if cell.level_chart.grows else cell.spread_chart
+    found: dict[str, Any] = {"signal": signal, "regime": regime, "since": round(1000 * chart.since_s)}
+    if chart is cell.spread_chart:
+        return found | {"way": "scatter"}
+    steps = round(abs(cell.standing.mean - cell.level.mean) / RESOLUTIONS[signal])
+    amount = round(steps * RESOLUTIONS[signal], 3)
+    return found | {"way": "down" if chart.grows > 0 else "up", "amount": amount, "unit": UNITS[signal]}
 
 
 def _open_in_words(given: Given, state: State, at_s: float) -> str:

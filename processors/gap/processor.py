@@ -17,7 +17,7 @@ from processors.gap.cell import Cell, Moments, closed, seen
 from processors.gap.comparison import INPUTS, Compared, comparison, times_compared
 from processors.gap.config import Config
 from processors.gap.described import Given, described
-from processors.gap.figures import BASIS, GROWING, GROWING_SIGNAL, LEFT_OUT, OPEN, WINDOW, opened, outputs
+from processors.gap.figures import BASIS, FINDINGS, GROWING, GROWING_SIGNAL, LEFT_OUT, OPEN, WINDOW, opened, outputs
 from processors.gap.signals import GAP, NAMES, REGIMES_MAX, REGIMES_OF_SIGNAL_MAX, RESOLUTIONS, SIGNALS, UNITS
 from processors.gap.state import State, begun, cells_of, healthy_s, taken_up, terms_of
 from processors.gap.timing import timed
@@ -108,6 +108,7 @@ def _specs() -> tuple[OutputSpec, ...]:
         )
     texts = {
         GROWING_SIGNAL: "which gap grows: signal, regime, since when",
+        FINDINGS: "JSON: the gaps that grow in values: signal, regime, way, amount, unit, since when",
         OPEN: "which gaps stand open though none grew: signal, regime, mean in floors, since when",
         WINDOW: "recorded stretch in which the growing gap was largest, UTC start/end: what to diagnose",
     }

@@ -8,6 +8,7 @@ blocks are taken to be healthy. Blocks count only while two tools or more of a p
 not told apart before.
 """
 
+import json
 from datetime import UTC, datetime
 from math import exp
 from typing import NamedTuple
@@ -75,9 +76,20 @@ def in_words(config: Config, drift: Drift, machine: str) -> str:
         return f"what all tools and programs share is as it was in {healthy}, which are assumed healthy"
     way = "risen" if drift.chart.grows > 0 else "fallen"
     since = datetime.fromtimestamp(drift.chart.since_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    lately = f"{100.0 * (exp(drift.level) - 1.0):+.1f} %"
+    lately = f"{_lately_pct(drift):+.1f} %"
     return (
         f"the load of all tools and programs has {way} since {since} against {healthy}, by {lately} lately, so it is not "
         f"one tool and not one batch; to name the cause: cnctwin gap case --store STORE --machine {machine} "
         "--out CASE && cnctwin gap diagnose CASE --out diagnosis; with cnctwin twin run it begins by itself"
     )
+
+
+def in_values(drift: Drift) -> str:
+    """Return the drift as JSON: since when (ms), and by how many per cent lately; an empty object while there is none."""
+    if drift.chart.grows == 0:
+        return "{}"
+    return json.dumps({"since": round(1000 * drift.chart.since_s), "pct": round(_lately_pct(drift), 1)})
+
+
+def _lately_pct(drift: Drift) -> float:
+    return 100.0 * (exp(drift.level) - 1.0)

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample
 from processors.tool_wear.config import Config
-from processors.tool_wear.drift import Drift, after_part, in_words, is_drifting
+from processors.tool_wear.drift import Drift, after_part, in_values, in_words, is_drifting
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
@@ -27,7 +27,11 @@ RECORD, TOOL = twin_signals.CUT_RECORD, "tool_number"
 WEAR, SLOPE = twin_signals.TOOL_WEAR_PCT, twin_signals.TOOL_WEAR_SLOPE_PCT
 LEFT, LOW, HIGH = twin_signals.TOOL_PARTS_LEFT, twin_signals.TOOL_PARTS_LEFT_LOW, twin_signals.TOOL_PARTS_LEFT_HIGH
 FAST, BASIS, LIVES = twin_signals.TOOL_WEARS_FAST, twin_signals.TOOL_WEAR_BASIS, twin_signals.TOOL_LIVES
-DRIFT, DRIFT_BASIS = twin_signals.MACHINE_DRIFT, twin_signals.MACHINE_DRIFT_BASIS
+DRIFT, DRIFT_BASIS, DRIFT_FINDINGS = (
+    twin_signals.MACHINE_DRIFT,
+    twin_signals.MACHINE_DRIFT_BASIS,
+    twin_signals.MACHINE_DRIFT_FINDINGS,
+)
 OF_THE_TOOL = (WEAR, SLOPE, LEFT, LOW, HIGH, BASIS)
 NO_PART = "no part has ended yet"
 SHOWN_MAX = 40
@@ -105,7 +109,7 @@ def _record(sample: Sample) -> tuple[str | None, str]:
 
 @lru_cache(maxsize=1000)
 def _nothing(reason: str) -> tuple[Output, ...]:
-    return tuple(Output.null(name, reason) for name in (*OF_THE_TOOL, FAST, LIVES, DRIFT, DRIFT_BASIS))
+    return tuple(Output.null(name, reason) for name in (*OF_THE_TOOL, FAST, LIVES, DRIFT, DRIFT_BASIS, DRIFT_FINDINGS))
 
 
 def _all(config: Config, state: State, machine: str) -> tuple[Output, ...]:
@@ -120,6 +124,7 @@ def _all(config: Config, state: State, machine: str) -> tuple[Output, ...]:
         Output(LIVES, json.dumps([one.document() for one in sorted(shown.values(), key=lambda one: one.tool)])),
         Output.null(DRIFT, not_drifts) if drifts is None else Output(DRIFT, drifts),
         Output.null(DRIFT_BASIS, not_drifts) if drifts is None else Output(DRIFT_BASIS, in_words(config, state.drift, machine)),
+        Output.null(DRIFT_FINDINGS, not_drifts) if drifts is None else Output(DRIFT_FINDINGS, in_values(state.drift)),
     )
 
 
@@ -174,6 +179,7 @@ PROCESSOR = Processor(
             DRIFT, DataType.BOOLEAN, None, "whether the load of all tools and programs has moved", _INFERRED, is_alarm=True
         ),
         OutputSpec(DRIFT_BASIS, _STRING, None, "since when, by how much, and the command that names the cause", _INFERRED),
+        OutputSpec(DRIFT_FINDINGS, _STRING, None, "JSON while it drifts: since when, and by how many per cent", _INFERRED),
     ),
     config=Config,
     state=State,

@@ -57,7 +57,7 @@ def test_what_has_no_severity_counts_where_that_is_asked_for_and_what_is_ignored
 
 def test_three_are_named_and_the_rest_is_counted() -> None:
     found = told([SERVO | {"code": str(n), "text": "a"} for n in range(5)])
-    assert found[TEXT] == "0 a; 1 a; 2 a; 2 more"
+    assert found[TEXT] == "0 a; 1 a; 2 a (+2)"
 
 
 @pytest.mark.parametrize("text", ["", "[", '{"code": 1}', "7", "[" * 100_000])

@@ -66,7 +66,25 @@ def test_the_window_that_a_growing_gap_wants_diagnosed_is_pinned_once() -> None:
 def test_a_flag_that_flaps_cannot_fill_the_disk() -> None:
     flapping = [told(ALARM, value=i % 2 == 0, at_s=1000.0 + 100 * i) for i in range(20)]
     state, pins, outputs = fold(*flapping)
-    assert len(pins) == state.pins == 3
+    assert state.pins == 3
+    assert len(pins) == 6  # three that begin, and go on until the flag fell
     assert outputs[-1].quality is Quality.BAD
     next_day = replace(state, risen=())
     assert step(CONFIG, next_day, told(ALARM, value=True, at_s=200_000.0))[1]
+
+
+def test_firings_that_overlap_are_one_stretch_and_cost_the_day_one() -> None:
+    told_of = [told(ALARM, value=i % 2 == 0, at_s=1000.0 + 20 * i) for i in range(40)]
+    state, pins, outputs = fold(*told_of)
+    assert state.pins == 1
+    assert outputs[-2:] == [Output(PINS, 1), Output(REASON, "anomaly_alarm")]
+    assert min(pin.from_ms for pin in pins) == 940_000
+    assert max(pin.to_ms for pin in pins) >= 1_780_000 + 30_000
+    assert len(pins) <= 1 + 840 / 30
+
+
+def test_another_reason_within_a_stretch_is_kept_too() -> None:
+    other = "twin/gap_growing"
+    state, pins, _ = fold(told(ALARM, value=True, at_s=1000.0), told(other, value=True, at_s=1000.0))
+    assert state.pins == 1
+    assert [pin.reason for pin in pins] == ["anomaly_alarm", "gap_growing"]

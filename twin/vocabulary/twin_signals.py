@@ -69,17 +69,21 @@ TOOL_LIVES = f"{TWIN_PREFIX}tool_lives"
 """JSON text after each part: all tools with their wear and parts left (twin/wear/status.py)."""
 MACHINE_DRIFT = f"{TWIN_PREFIX}machine_drift"
 MACHINE_DRIFT_BASIS = f"{TWIN_PREFIX}machine_drift_basis"
+MACHINE_DRIFT_FINDINGS = f"{TWIN_PREFIX}machine_drift_findings"
+"""JSON text while the machine drifts: since when (ms), and by how many per cent (processors/tool_wear/drift.py)."""
 
 # gap
 GAP_PREFIX = f"{TWIN_PREFIX}gap_"
 """Followed by a signal: its standing gap; by a signal, a slash and a regime: the gap in that regime."""
 GAP_GROWING = f"{GAP_PREFIX}growing"
 GAP_GROWING_SIGNAL = f"{GAP_PREFIX}growing_signal"
+GAP_FINDINGS = f"{GAP_PREFIX}findings"
+"""JSON text: of each gap that grows signal, regime, way, by how much, unit, since when (ms), the largest first."""
 GAP_OPEN = f"{GAP_PREFIX}open"
 GAP_WINDOW = f"{GAP_PREFIX}window"
 GAP_LEFT_OUT_PCT = f"{GAP_PREFIX}left_out_pct"
 GAP_BASIS = f"{GAP_PREFIX}basis"
-GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_OPEN, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
+GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_FINDINGS, GAP_OPEN, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
 """Metrics about the comparison, published beside the gaps themselves."""
 
 # rules

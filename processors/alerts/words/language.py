@@ -64,6 +64,9 @@ class Language(BaseModel):
     alerts: dict[str, Texts]
     signals: dict[str, str] = {}
     sides: dict[str, str] = {}
+    regimes: dict[str, str] = {}
+    units: dict[str, str] = {}
+    reasons: dict[str, str] = {}
 
 
 @lru_cache

@@ -1,6 +1,7 @@
 """The wording of notifications in one language: titles, texts and sentences, rendered from its templates."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
@@ -14,11 +15,13 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from processors.alerts.lag import PLANT
 from processors.alerts.state import ALERTS_MAX, Alert, Phase, Severity
+from processors.alerts.statement import Statement
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
 from twin.vocabulary.twin_signals import RULE_PREFIX, RULE_VIBRATION, TWIN_PREFIX
 
 SENTENCE_MAX, TITLE_MAX, TEXT_MAX, FILLED_MAX = 300, 200, 2000, 100_000
 SHOWN_MS, SHOWN_MAX = 300_000, 50
+_AXIS = re.compile(r"axis_([a-z]\d{0,2})_(.+)")
 MINUTE_S, HOUR_S, DAY_S = 60.0, 3600.0, 86_400.0
 SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError, RecursionError, MemoryError)
 """Whatever a template of somebody's own may run into."""
@@ -29,8 +32,9 @@ KNOWN = frozenset(
         *("kind", "alerts", "first", "count", "others", "machines", "notes", "who", "machine", "alert", "name", "signal_name"),
         *("severity", "is_on", "acknowledged_by", "unknown", "since", "ended", "lasting", "for_lasting", "why", "value", "limit"),
         *("unit", "lasted_s", "line", "signal", "side", "away", "away_unit", "against", "parts", "line_from", "line_to", "like"),
-        *("likeness", "peers", "what_grows", "what_drifts", "left", "left_low", "left_high", "program", "tool", "control"),
-        *("control_alarm", "sentence"),
+        *("likeness", "peers", "regime", "section", "way", "left", "left_low", "left_high", "program", "tool", "control", "news"),
+        *("control_alarm", "fed", "busy", "runners", "partitions", "waiting", "processors", "remedy"),
+        *("times", "within", "stays_away", "away_for"),
     }
 )
 """The names that a template may use; a language of somebody's own that uses another is refused."""
@@ -48,15 +52,34 @@ class Missing(Undefined):
         self._fail_with_undefined_error()
 
 
+class Flapping(NamedTuple):
+    """An alert that comes and goes: how often it has fired within how long, and how long it has to stay away to be over."""
+
+    times: int
+    within_s: float
+    stays_away_s: float
+
+
 class Occasion(NamedTuple):
     """The occasion of a text.
 
-    clock_s: of the state, which never goes back; kind: of the notification; news: how many of its alerts are new: the first ones
+    clock_s: of the state, which never goes back; kind: of the notification; says: what is new, of its first alerts one by one
+    flapping: by fingerprint, those of its alerts that come and go
     """
 
     clock_s: float
     kind: str = "notify"
-    news: int = 0
+    says: tuple[Statement, ...] = ()
+    flapping: Mapping[str, Flapping] = {}
+
+
+class _Said(NamedTuple):
+    """What is said of an alert, whatever the occasion."""
+
+    alert: Alert
+    summary: str
+    details: str
+    advice: str
 
 
 class Wording:
@@ -70,10 +93,11 @@ class Wording:
         self._environment = environment = ImmutableSandboxedEnvironment(undefined=Missing, autoescape=False, trim_blocks=False)
         form = words.form
         environment.filters["number"] = lambda value, digits=3: number(value, form.decimal, digits)
+        environment.filters["counted"] = lambda value, one, many: counted(value, one, many, form.decimal)
         environment.filters["capitalized"] = lambda text: f"{text[:1].upper()}{text[1:]}"
         environment.filters["listed"] = lambda parts: ", ".join(str(part) for part in parts if part)
         self._templates = {text: _compiled(environment, where, text) for where, text in _templates_of(words)}
-        self._rendered_of: dict[str, tuple[Alert, str, str]] = {}  # by fingerprint
+        self._rendered_of: dict[str, _Said] = {}  # by fingerprint
 
     def tried(self) -> "Wording":
         """Return it, once each template names only what there is, and title and text could be filled. Raises ValueError."""
@@ -118,22 +142,22 @@ class Wording:
 
     def summary(self, alert: Alert) -> str:
         """Return an alert in one line that stays the same while the alert lasts."""
-        return self._said(alert)[0]
+        return self._said(alert).summary
 
     def details(self, alert: Alert) -> str:
         """Return what the machine was doing, and why a score alarms."""
-        return self._said(alert)[1]
+        return self._said(alert).details
 
     def advice(self, alert: Alert) -> str:
-        """Return what to do first; "" where nothing is known of it."""
-        return self._texts(alert).advice
+        """Return what to do first; "" where nothing is known of it, or it is over."""
+        return self._said(alert).advice
 
     def link(self, alert: Alert) -> str:
         """Return the address of the moment on the page; "" without a page."""
         return link(self._page, alert)
 
     def _of_notice(self, alerts: Sequence[Alert], notes: tuple[str, ...], occasion: Occasion) -> dict[str, Any]:
-        new = sorted(alerts[: occasion.news or len(alerts)], key=lambda alert: not alert.is_on)  # what is over stands last
+        new = sorted(alerts[: len(occasion.says) or None], key=lambda alert: not alert.is_on)  # what is over stands last
         first, *rest = (*new, *alerts[len(new) :])
         return {
             "kind": occasion.kind,
@@ -146,46 +170,66 @@ class Wording:
         }
 
     def _of_alert(self, alert: Alert, occasion: Occasion) -> dict[str, Any]:
-        facts = self._facts(alert, {"lasting": self._duration(lasted_s(alert, occasion))})
+        news = {(said.fingerprint, said.episode): said.what for said in occasion.says}
+        more: dict[str, Any] = {"lasting": self._duration(lasted_s(alert, occasion))}
+        more["news"] = news.get((alert.fingerprint, alert.episode), "")
+        if alert.is_on and (flapping := occasion.flapping.get(alert.fingerprint)) is not None:
+            more |= {"times": flapping.times, "within": self._duration(flapping.within_s)}
+            more |= {"stays_away": self._duration(flapping.stays_away_s), "away_for": self._duration(alert.clear_s)}
+        facts = self._facts(alert, more)
         return facts | {
             "what": self._what(alert, facts),
             "details": self._details(alert, facts),
-            "advice": self._texts(alert).advice,
+            "advice": self._advice(alert, facts),
             "link": self.link(alert),
         }
 
-    def _said(self, alert: Alert) -> tuple[str, str]:
-        """Return summary and details, rendered once for all the beats at which an alert is the same value."""
+    def _said(self, alert: Alert) -> _Said:
+        """Return what is said of an alert, rendered once for all the beats at which it is the same value."""
         known = self._rendered_of.get(alert.fingerprint)
-        if known is None or known[0] is not alert:
+        if known is None or known.alert is not alert:
             if len(self._rendered_of) >= ALERTS_MAX:
                 self._rendered_of.clear()
-            facts = self._facts(alert, {})
-            known = self._rendered_of[alert.fingerprint] = (alert, self._what(alert, facts), self._details(alert, facts))
-        return known[1:]
+            lasting = self._duration(lasted_s(alert, Occasion(0.0))) if alert.phase is Phase.RESOLVED else ""
+            facts = self._facts(alert, {"lasting": lasting})
+            known = _Said(alert, self._what(alert, facts), self._details(alert, facts), self._advice(alert, facts))
+            self._rendered_of[alert.fingerprint] = known
+        return known
 
-    def _facts(self, alert: Alert, more: Mapping[str, str]) -> dict[str, Any]:
+    def _facts(self, alert: Alert, more: Mapping[str, Any]) -> dict[str, Any]:
         """Return what templates may say of an alert; `for_lasting` is empty where nothing is known of its duration."""
         words = self._words
-        told = alert.facts.get("signal", alert.signal) or alert.name
+        told = str(alert.facts.get("signal", alert.signal) or alert.name)
         facts: dict[str, Any] = {
             **alert.facts,
             "machine": alert.machine,
             "alert": alert.name,
             "name": self._texts(alert).name,
-            "signal_name": words.signals.get(str(told), _spelled(str(told))),
+            "signal_name": self._signal_name(told),
             "severity": words.severities.get(alert.severity.value, alert.severity.value),
             "is_on": alert.is_on or alert.phase is Phase.PENDING,
             "acknowledged_by": alert.acknowledged_by,
-            "unknown": alert.unknown,
-            "since": self._moment(alert.episode),
+            "unknown": words.reasons.get(alert.unknown, alert.unknown),
+            "since": self._moment(began_ms(alert)),
             "ended": "" if alert.is_on or not alert.ended_ms else self._moment(max(alert.ended_ms, alert.episode)),
             **more,
         }
-        if "side" in alert.facts:
-            facts["side"] = words.sides.get(str(alert.facts["side"]), alert.facts["side"])
+        for name, terms in (("side", words.sides), ("regime", words.regimes), ("away_unit", words.units), ("unit", words.units)):
+            if name in alert.facts:
+                facts[name] = terms.get(str(alert.facts[name]), alert.facts[name])
         facts["for_lasting"] = self._rendered(words.for_lasting, facts) if facts.get("lasting") else ""
         return facts
+
+    def _signal_name(self, signal: str) -> str:
+        """Return the words for a signal; those of an axis are found with `*` for its letter."""
+        names = self._words.signals
+        if signal in names or (axis := _AXIS.fullmatch(signal)) is None:
+            return names.get(signal, _spelled(signal))
+        return names.get(f"axis_*_{axis[2]}", _spelled(signal)).replace("*", axis[1].upper())
+
+    def _advice(self, alert: Alert, facts: Mapping[str, Any]) -> str:
+        advice = self._texts(alert).advice
+        return "" if alert.phase is Phase.RESOLVED or not advice else _one_line(self._rendered(advice, facts))
 
     def _texts(self, alert: Alert) -> Texts:
         return self._words.alerts.get(alert.name) or Texts(name=_spelled(alert.signal or alert.name))
@@ -231,11 +275,21 @@ def lasted_s(alert: Alert, occasion: Occasion) -> float | None:
 
     Durations go by our own clock while it lasts, since the control's may be set, and by the control's own times once it is over.
     """
-    before_s = alert.facts.get("lasted_s", 0.0)
-    before_s = before_s if isinstance(before_s, (int, float)) else 0.0
+    before_s = _before_s(alert)
     if alert.is_on:
         return before_s + alert.held_s + max(0.0, occasion.clock_s - alert.fired_s)
     return before_s + (alert.ended_ms - alert.episode) / 1000.0 if alert.ended_ms else None
+
+
+def began_ms(alert: Alert) -> int:
+    """Return when it began to be so, which may be before it became an alert."""
+    return alert.episode - round(_before_s(alert) * 1000)
+
+
+def _before_s(alert: Alert) -> float:
+    """Return how long it had been so when it became an alert."""
+    before_s = alert.facts.get("lasted_s", 0.0)
+    return float(before_s) if isinstance(before_s, (int, float)) else 0.0
 
 
 def number(value: Any, decimal: str, digits: int = 3) -> str:
@@ -249,6 +303,16 @@ def number(value: Any, decimal: str, digits: int = 3) -> str:
         raise ValueError("no number")
     text = f"{given:.0f}" if abs(given) >= 10 ** (digits - 1) else f"{float(f'{given:.{digits}g}'):.{digits + 3}f}"
     return (text.rstrip("0").rstrip(".") if "." in text else text).replace(".", decimal) or "0"
+
+
+def counted(value: Any, one: str, many: str, decimal: str) -> str:
+    """Return a number with its noun, in the singular where the number is written as 1.
+
+    >>> counted(1.0, "part", "parts", "."), counted(1.4, "part", "parts", "."), counted(0, "Teil", "Teile", ",")
+    ('1 part', '1.4 parts', '0 Teile')
+    """
+    text = number(value, decimal)
+    return f"{text} {one if text == '1' else many}"
 
 
 def duration(seconds: float, form: Form) -> str:
@@ -300,7 +364,7 @@ def _templates_of(words: Language) -> Iterable[tuple[str, str]]:
     for where in ("title", "text", "over", "other", "details", "held_back", "asked_by", "for_lasting"):
         yield where, getattr(words, where)
     for alert, texts in words.alerts.items():
-        for where in ("what", "why"):
+        for where in ("what", "why", "advice"):
             if text := getattr(texts, where):
                 yield f"alerts.{alert}.{where}", text
 

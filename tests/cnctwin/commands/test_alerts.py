@@ -22,9 +22,19 @@ from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
 from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
+from twin.vocabulary.twin_signals import RULE_FINDINGS
 
 pytestmark = pytest.mark.broker
-TABLE = '[alerts]\ngroup_wait_s = 0.0\n[alerts.receivers.desk]\ntype = "webhook"\nurl = "{url}/desk"\n'
+TABLE = """\
+[alerts]
+group_wait_s = 0.0
+[alerts.signals]
+"twin/rule_vibration" = {{ severity = "high", keep_firing_for_s = 0.0 }}
+[alerts.receivers.desk]
+type = "webhook"
+url = "{url}/desk"
+"""
+FINDINGS = json.dumps({"vibration": {"value": 8.25, "limit": 7.1, "unit": "mm/s", "signal": "vibration_velocity_mm_s"}})
 
 
 class Cnctwin:
@@ -67,7 +77,8 @@ def edge(broker: BrokerAddress, server: ReceivingServer, tmp_path: Path) -> Iter
     file = tmp_path / "alerts.toml"
     file.write_text(TABLE.format(url=server.url))
     edge = EdgeNode(broker, NodeId("cnc", "edge-okuma"), [MetricSpec("health/beat", DataType.INT64)])
-    edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=False)])
+    findings = MetricSpec(RULE_FINDINGS, DataType.STRING, value=FINDINGS)
+    edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=False), findings])
     edge.start()
     courier = Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"]))
     with until_stopped(run, configured(["alerts"], file), broker):
@@ -92,6 +103,7 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
         assert time.monotonic() < deadline_s
     code, out, _ = cnctwin("list")
     assert "rule_vibration" in out
+    assert "okuma: Vibration 8.25 mm/s, limit 7.1 mm/s" in out
     assert "firing" in out
     (alert,) = json.loads(cnctwin("list", "--json")[1])["alerts"]
     code, out, err = cnctwin("ack", alert["fingerprint"][:6], "--by", "ada", "--comment", "on my way")
@@ -109,6 +121,14 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
     assert server.received[-1].json["groupKey"] == "test"
     server.answers.append(Answer(401))
     assert cnctwin("test", "desk") == (1, "", "desk: failed: 127.0.0.1 answered 401\n")
+    fire(edge, False)
+    deadline_s = time.monotonic() + 60.0
+    while "okuma: Over after " not in cnctwin("list")[1]:
+        assert time.monotonic() < deadline_s
+    code, out, _ = cnctwin("list")
+    assert code == 0
+    assert "no alert fires" in out
+    assert "s: vibration too high" in out
 
 
 def test_wrong_input_is_one_line_and_exit_code_2(cnctwin: Cnctwin, edge: EdgeNode) -> None:

@@ -139,7 +139,7 @@ def test_a_silence_matches_by_labels_with_wildcards_and_ends_by_itself() -> None
     shop.set(vibration=True, drift=True)
     shop.set("mazak", vibration=True)
     told = shop.wait(60)
-    drifts = "okuma: Scores drift: the model no longer fits the machine for 10 s"
+    drifts = "okuma: Scores have drifted for 10 s: the model no longer fits the machine"
     assert sorted(one.title for one in told) == ["mazak: Vibration too high for 10 s", drifts]
     silence = shop.state.silences[0]
     assert shop.alert()["silenced_by"] == silence.id

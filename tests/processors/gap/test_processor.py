@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from processors.actions import Publish
 from processors.errors import ConfigurationError
 from processors.gap.growth import BLOCKS_MIN
-from processors.gap.processor import BASIS, GAP, GROWING, GROWING_SIGNAL, LEFT_OUT, PROCESSOR, WINDOW
+from processors.gap.processor import BASIS, FINDINGS, GAP, GROWING, GROWING_SIGNAL, LEFT_OUT, PROCESSOR, WINDOW
 from processors.gap.state import State
 from processors.running.engine import Engine
 from processors.running.snapshot import decode_state, encode_state
@@ -152,7 +152,7 @@ def test_a_healthy_year_is_silent(machine: type[Weeks]) -> None:
     weeks = machine(tick_s=1800.0, block_s=7200.0).run(379 * DAY_S)
     assert weeks.alarms == 0
     assert weeks.shown[GROWING] is False
-    assert (weeks.shown[GROWING_SIGNAL], weeks.shown[WINDOW]) == ("none", "none")
+    assert (weeks.shown[GROWING_SIGNAL], weeks.shown[WINDOW], weeks.shown[FINDINGS]) == ("none", "none", "[]")
     assert weeks.shown[AXIS_Z] == pytest.approx(1.0, abs=0.3)
     assert weeks.shown[f"{LOAD}/mean"] == pytest.approx(3.0 - 3.2, abs=0.3)
 
@@ -201,6 +201,10 @@ def test_a_failing_counterbalance_shows_at_standstill_and_drives_that_are_off_do
     weeks.run(2 * DAY_S, lambda signal, _: 4.0 if signal == "axis_z_load_pct" else 0.0)
     assert weeks.shown[GROWING_SIGNAL].startswith("axis_z_load_pct in standstill: twin minus measured has fallen")
     assert weeks.shown[f"{AXIS_Z}/mean"] == pytest.approx(-4.0, abs=0.7)
+    (found,) = json.loads(weeks.shown[FINDINGS])
+    assert weeks.at_s - 2 * DAY_S <= found.pop("since") / 1000.0 < weeks.at_s
+    assert found.pop("amount") in (3.0, 4.0, 5.0)
+    assert found == {"signal": "axis_z_load_pct", "regime": "standstill", "way": "up", "unit": "%"}
 
 
 def test_a_scatter_that_doubles_is_a_growing_gap_too(machine: type[Weeks]) -> None:
@@ -209,6 +213,8 @@ def test_a_scatter_that_doubles_is_a_growing_gap_too(machine: type[Weeks]) -> No
     weeks.run(3 * DAY_S, lambda signal, _: noise.gauss(0.0, 1.5) if signal == "spindle_load_pct" else 0.0)
     assert weeks.shown[GROWING] is True
     assert "spindle_load_pct in air: scatter has grown since" in weeks.shown[GROWING_SIGNAL]
+    found = next(one for one in json.loads(weeks.shown[FINDINGS]) if one["signal"] == "spindle_load_pct")
+    assert (found["way"], found["regime"], "amount" in found) == ("scatter", "air", False)
 
 
 def test_a_gap_that_has_gone_is_said_to_be_gone(machine: type[Weeks]) -> None:

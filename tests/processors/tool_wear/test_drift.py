@@ -1,9 +1,10 @@
 """The drift of the machine: batches come and go without an alarm, what stays is told, with the command that names its cause."""
 
+import json
 from random import Random
 
 from processors.tool_wear.config import Config
-from processors.tool_wear.drift import Drift, after_part, in_words, is_drifting
+from processors.tool_wear.drift import Drift, after_part, in_values, in_words, is_drifting
 from twin.wear.joint import MATERIAL, Joint, renewed
 from twin.wear.machine import Wear
 
@@ -37,6 +38,11 @@ def test_a_drift_that_stays_is_told_with_the_command() -> None:
     words = in_words(CONFIG, found, "vmc")
     assert "risen since 1970-02-0" in words
     assert "cnctwin gap case --store STORE --machine vmc" in words
+    values = json.loads(in_values(found))
+    assert 4.0 < values["pct"] < 9.0
+    assert f"by {values['pct']:+.1f} % lately" in words
+    assert values["since"] == 1000 * found.chart.since_s
+    assert in_values(after(70)[0]) == "{}"
 
 
 def test_before_the_healthy_blocks_nothing_is_judged() -> None:

@@ -30,6 +30,7 @@ class Notification:
     at_s: float
     receiver: str
     kind: str
+    severity: str
     id: str
     title: str
     text: str
@@ -146,6 +147,7 @@ class Shop:
             self.wall_s - T0_S,
             said["receiver"],
             said["kind"],
+            said["severity"],
             said["id"],
             said["title"],
             said["text"],
