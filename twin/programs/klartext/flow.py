@@ -104,6 +104,10 @@ class Flow:
             self.texts[stem] = Text(text, stem)
         return self.texts[stem]
 
+    def text_of(self, program: str | None) -> Text:
+        """Return the text of that name; None = the main program."""
+        return self.levels[0].text if program is None else self.texts[program]
+
     def leave(self) -> Level | None:
         """END PGM or the end of a text: back to the caller; returns what was left, None in the main program."""
         while not self.level.program:

@@ -17,7 +17,7 @@ from twin.programs.sinumerik.frames import Frames
 MM_PER_INCH: Final = 25.4
 START: Final = {
     **{"motion": "G1", "plane": "G17", "cutter": "G40", "work": "G500", "path": "G64", "distance": "G90", "feed": "G94"},
-    **{"contour_feed": "CFC", "approach": "NORM", "corner": "G450", "jerk": "BRISK", "feed_forward": "FFWOF", "dialect": "G290"},
+    **{"contour_feed": "CFC", "approach": "NORM", "corner": "G450", "jerk": "SOFT", "feed_forward": "FFWOF", "dialect": "G290"},
 }
 """The G codes in force at the start: those that a control comes with, and continuous path as milling machines are set up."""
 

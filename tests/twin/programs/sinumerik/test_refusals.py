@@ -40,6 +40,8 @@ from twin.errors import PartProgramError
         ("G999", "G999", "no such subprogram, cycle or G code"),
         ("G20", "G20", "no such subprogram, cycle or G code"),
         ("NOSUCH", "NOSUCH", "no such subprogram"),
+        ("SUB1 M8", "M8", "stands beside the call of SUB1"),
+        ("CYCLE81(10,0,1,-5) M9", "M9", "stands beside the call of CYCLE81"),
         ("NOSUCH(1,2)", "NOSUCH", "no such subprogram"),
         ("MCALL NOSUCH", "NOSUCH", "no such subprogram"),
         ("Q5", "Q5", "has no meaning"),
