@@ -177,7 +177,9 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     if path.axes[:3] != ("x", "y", "z") or not len(path):
         return none
     if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
-        notes.append(f"the program changes tools; all of them are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]")
+        one = f"the {machine.tool.diameter_mm:g} mm one of [tool]"
+        beside = "; expect and optimise take each [tools.N]" if machine.tools else ""
+        notes.append(f"the program changes tools, and this run cuts with {one} throughout{beside}")
     rows = engaged_along(path, machine.stock, [Section(0, len(path), machine.tool.diameter_mm)])
     for hit in rows.collisions[:3]:
         line = int(path.line[hit.segment]) + 1
