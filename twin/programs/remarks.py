@@ -53,7 +53,8 @@ def _spindle_at_rest(dialect: Dialect, lines: list[str], moves: Sequence[Move]) 
 
 def _place(dialect: Dialect, lines: list[str], at: int) -> str:
     """Return a line as the control names it: by the number of its block too, where it shows that."""
-    number = dialect.words.block_number(lines[at]) if dialect.blocks_are_numbered else None
+    numbers = (dialect.words.block_number(line) for line in reversed(lines[: at + 1])) if dialect.blocks_are_numbered else ()
+    number = next((one for one in numbers if one is not None), None)
     return f"line {at + 1}" if number is None else f"block {number} (line {at + 1})"
 
 

@@ -37,6 +37,11 @@ def test_a_program_that_was_cut_off_is_named_with_its_last_line(language: str, g
     assert f"no {end} follows" in only
 
 
+def test_a_block_of_several_lines_is_named_by_its_number() -> None:
+    (cut, _) = said("klartext", "0 BEGIN PGM A MM\n1 L X+5 F500\n2 CYCL DEF 200 DRILLING ~\n    Q200=2 ~\n    Q201=-5 ~")
+    assert cut.startswith("block 2 (line 5) is the last, 'Q201=-5 ~'")
+
+
 @pytest.mark.parametrize("language", WHOLE)
 def test_cuts_without_a_spindle_are_named_with_the_first_of_them(language: str) -> None:
     (only,) = said(language, WHOLE[language].replace("M3\n", "\n"))

@@ -25,7 +25,11 @@ class Arguments:
         while given and given[-1] is None:
             given.pop()
         if len(given) > len(names):
-            raise RefusedError(cycle, f"takes {len(names)} arguments, and the call has {len(given)}")
+            raise RefusedError(
+                cycle,
+                f"takes {len(names)} arguments, and the call has {len(given)}; one that Operate wrote is not read: "
+                "post this operation without the cycle",
+            )
         self.cycle, self.unit_mm = cycle, unit_mm
         self.values = dict(zip(names, given, strict=False))
 
