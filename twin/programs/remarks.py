@@ -52,9 +52,12 @@ def _spindle_at_rest(dialect: Dialect, lines: list[str], moves: Sequence[Move]) 
 
 
 def _place(dialect: Dialect, lines: list[str], at: int) -> str:
-    """Return a line as the control names it: by the number of its block too, where it shows that."""
-    numbers = (dialect.words.block_number(line) for line in reversed(lines[: at + 1])) if dialect.blocks_are_numbered else ()
-    number = next((one for one in numbers if one is not None), None)
+    """Return a line with the number by which the control shows it: its N word, or that of the block that it is in."""
+    number_of = dialect.words.block_number
+    if not dialect.blocks_are_numbered:
+        number = number_of(lines[at])
+        return f"line {at + 1}" if number is None else f"line {at + 1} (N{number})"
+    number = next((one for line in reversed(lines[: at + 1]) if (one := number_of(line)) is not None), None)
     return f"line {at + 1}" if number is None else f"block {number} (line {at + 1})"
 
 

@@ -28,7 +28,7 @@ def test_nothing_is_remarked_of_a_whole_program(language: str) -> None:
     [
         ("fanuc", "M30\n%", "line 5 is the last, 'G1 Z-1. F200'", "M30"),
         ("klartext", "4 END PGM A MM", "block 3 (line 4) is the last, '3 L Z-1 F200'", "END PGM"),
-        ("sinumerik", "N40 M30", "line 3 is the last, 'N30 G1 Z-1 F200'", "M30"),
+        ("sinumerik", "N40 M30", "line 3 (N30) is the last, 'N30 G1 Z-1 F200'", "M30"),
     ],
 )
 def test_a_program_that_was_cut_off_is_named_with_its_last_line(language: str, gone: str, last: str, end: str) -> None:
