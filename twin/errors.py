@@ -61,9 +61,11 @@ class PartProgramError(TwinError):
     word: the word at fault, as written; empty where a whole block is
     reason: what is wrong with it and the way out
     program: name of the text that the line is in; None = the main program
+    block: number of the line's block, where the control shows that number and not the line
     """
 
-    def __init__(self, line: int, word: str, reason: str, program: str | None = None) -> None:
-        self.line, self.word, self.reason, self.program = line, word, reason, program
-        where = f"line {line}" if program is None else f"{program}, line {line}"
+    def __init__(self, line: int, word: str, reason: str, program: str | None = None, block: int | None = None) -> None:
+        self.line, self.word, self.reason, self.program, self.block = line, word, reason, program, block
+        where = f"line {line}" if block is None else f"block {block} (line {line})"
+        where = where if program is None else f"{program}, {where}"
         super().__init__(f"{where}: {word + ': ' if word else ''}{reason}")

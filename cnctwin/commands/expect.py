@@ -36,12 +36,15 @@ def expect(
 ) -> None:
     """Work out the feed, time, force and spindle load of each line of part programs, for look-up while they run."""
     with needed_by("the twin", "twin"):
+        from dataclasses import replace
+
         from processors.description import version_of
         from twin.errors import TwinError
         from twin.expected.files import written
         from twin.expected.making import expectation_of
         from twin.machine import machine_from_toml
         from twin.simulator.simulation import program_settings
+    _check_names(programs)
     text = read_text(machine)
     described = machine_from_toml(text, str(machine))
     if name is not None:
@@ -51,7 +54,8 @@ def expect(
     shown: list[dict[str, Any]] = []
     for program in programs:
         source = read_text(program)
-        kept = None if fresh else _up_to_date(out, described.machine.name, program.stem, source, version)
+        kept = _up_to_date(out, described.machine.name, program, source, version)
+        kept = None if fresh else kept
         if kept is not None and numbering in (None, kept.numbering):
             shown.append(_shown(kept, program, None, as_json=as_json))
             continue
@@ -63,6 +67,7 @@ def expect(
                 )
             except TwinError as error:
                 raise UsageError(f"{program}: {error}") from None
+        made = replace(made, file=program.name)
         shown.append(_shown(made, program, written(out, made), as_json=as_json))
     if as_json:
         sys.stdout.write(json.dumps(shown) + "\n")
@@ -92,19 +97,42 @@ def _numbering(lines: str) -> "Numbering | None":
     return Numbering(lines)
 
 
-def _up_to_date(out: Path, machine: str, program: str, source: str, version: str) -> "Expectation | None":
-    """Return the expectation that is there already, if program and description are still those that it was worked out from."""
+def _check_names(programs: list[Path]) -> None:
+    """Raises UsageError for two programs that have the same name but for their endings: the processors know no endings."""
+    from twin.vocabulary.program_names import program_key
+
+    by_key: dict[str, Path] = {}
+    for program in programs:
+        other = by_key.setdefault(program_key(program.name), program)
+        if other.resolve() != program.resolve():
+            raise UsageError(f"{program}: {_one_name(other.name, program.name)}")
+
+
+def _one_name(one: str, other: str) -> str:
+    return (
+        f"{one} and {other} are one program to the processors, which look it up without ending and leading zeros; "
+        "rename one of them, or give each machine a folder of its own with --out"
+    )
+
+
+def _up_to_date(out: Path, machine: str, program: Path, source: str, version: str) -> "Expectation | None":
+    """Return the expectation that is there already, if program and description are still those that it was worked out from.
+
+    Raises UsageError where it is that of another file.
+    """
     from twin.errors import ExpectationError
     from twin.expected.files import place_of, read_expectation, stale
     from twin.expected.making import text_sha256
 
-    path = place_of(out, machine, program)
+    path = place_of(out, machine, program.stem)
     if not path.is_file():
         return None
     try:
         kept = read_expectation(path)
     except ExpectationError:
         return None
+    if kept.file not in ("", program.name):
+        raise UsageError(f"{path}: {_one_name(kept.file, program.name)}; if {kept.file} is gone, delete {path.name}")
     is_stale = kept.description != version or stale(kept, program_sha256=text_sha256(source)) is not None
     return None if is_stale else kept
 

@@ -27,6 +27,7 @@ class Expectation:
 
     program_sha256, description: of the texts that it was worked out from; runs: in the order in which they are run
     o_word: the number that the program gives itself; empty = none
+    file: name of the program's file, with its ending; empty = not known
     meter: None where the machine has no [spindle], so that no load is known
     """
 
@@ -39,6 +40,7 @@ class Expectation:
     program_sha256: str = ""
     description: str = ""
     o_word: str = ""
+    file: str = ""
 
     @cached_property
     def runs_of_line(self) -> dict[int, tuple[int, ...]]:

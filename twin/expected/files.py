@@ -105,6 +105,7 @@ def to_json(expectation: Expectation) -> str:
         "program": expectation.program,
         "machine": expectation.machine,
         "o_word": expectation.o_word,
+        "file": expectation.file,
         "numbering": expectation.numbering.value,
         "program_sha256": expectation.program_sha256,
         "description": expectation.description,
@@ -162,6 +163,7 @@ def _of(body: Mapping[str, Any]) -> Expectation:
         program_sha256=str(body["program_sha256"]),
         description=str(body["description"]),
         o_word=str(body["o_word"]),
+        file=str(body.get("file", "")),
     )
 
 

@@ -35,6 +35,7 @@ from twin.optimisation.program import END_FACE_MM2
 from twin.programs import Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
+from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 from twin.simulator.simulation import program_plan, program_settings
 
@@ -70,11 +71,12 @@ def expectation_of(
         machine = machine.model_copy(update={"tools": {**machine.tools, **tools}})
     settings = program_settings(machine) if settings is None else settings
     dialect = dialect_of(program_text, settings)
-    moves = with_line_elsewhere(dialect.interpret(program_text, settings), OUTSIDE)
+    own = dialect.interpret(program_text, settings)
+    moves = with_line_elsewhere(own, OUTSIDE)
     source, block_number = source_lines(program_text), dialect.words.block_number
     numbering = numbering_of(source, block_number) if numbering is None else numbering
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
-    notes: list[str] = []
+    notes = [*remarks(dialect, program_text, own)]
     plan = program_plan(machine, path, notes)
     missing = Missing()
     given = _Given.of(machine, path, plan, notes, missing)

@@ -1,6 +1,8 @@
 """The answer put together: lines, totals, distance to the bound, what the uncertainty makes of it, in words and figures."""
 
 import difflib
+import math
+from collections.abc import Sequence
 
 from twin.errors import OptimisationError
 from twin.machine import Limits
@@ -12,6 +14,7 @@ from twin.optimisation.forces import CutForces
 from twin.optimisation.learned_forces import learned_notes
 from twin.optimisation.margin import margin
 from twin.optimisation.problem import Problem
+from twin.optimisation.program import FeedLine
 from twin.optimisation.question import Question, problem, single
 from twin.optimisation.reasons import what_binds
 from twin.optimisation.rewriting import Rewritten
@@ -21,6 +24,8 @@ from twin.optimisation.speeds.notes import speed_notes
 from twin.optimisation.speeds.stretches import changes_in_material
 from twin.optimisation.uncertainty import PRICED, sensitivity
 from twin.programs.source import source_lines
+
+LINES_SHOWN = 5
 
 
 def answered(
@@ -166,11 +171,16 @@ def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple
     if plunging := sum(line.plunges for line in made.program.lines):
         notes.append(f"the force of {plunging} lines that go down into material is not modelled: it is in no figure and no limit")
     if alone:
-        notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone")
+        notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone: {_reasons(alone)}")
     if made.economy is not None and not made.economy.wears_in_cut:
         notes.append('the tool is taken to wear all the time (Eq. 20); [cost] tool_wears = "in_cut" counts cutting only')
     if limits_of(made.program.machine, question.force_limit_n).chip_mm is None:
         notes.append("no limit of the chip: look at the greatest one, or write chip_mm in [limits]")
+    if limits_of(made.program.machine, question.force_limit_n).surface_speed_m_min is None:
+        fastest = _fastest_m_min(made, path)
+        notes.append(
+            f"no limit of the surface speed: the greatest is {fastest:.0f} m/min; surface_speed_m_min in [limits] holds it"
+        )
     if any(tool.modes for _, tool in made.program.tools):
         notes.append("chatter by zero order: where teeth cut one by one a pocket can hold less than it promises; try it before")
     notes += learned_notes(made.program.machine)
@@ -179,3 +189,27 @@ def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple
     if limits_of(made.program.machine, question.force_limit_n).force_n is None:
         notes.append("no force limit: --force-limit-n, or force_n in [limits]")
     return tuple(notes)
+
+
+def _reasons(alone: Sequence[FeedLine]) -> str:
+    """Return the lines that are left alone by their reason, a few of each."""
+    by_why: dict[str, list[int]] = {}
+    for line in alone:
+        by_why.setdefault(line.left_alone, []).append(line.line + 1)
+    said = []
+    for why, numbers in by_why.items():
+        more = f" and {len(numbers) - LINES_SHOWN} more" if len(numbers) > LINES_SHOWN else ""
+        shown = ", ".join(str(number) for number in sorted(numbers)[:LINES_SHOWN])
+        said.append(f"line{'s'[: len(numbers) > 1]} {shown}{more} ({why})")
+    return "; ".join(said)
+
+
+def _fastest_m_min(made: Problem, path: Path) -> float:
+    """Return the greatest surface speed of the lines that cut, m/min."""
+    rpm, lines, allowed = path.commanded_rpm(), made.program.lines, made.allowed
+    speeds = [
+        math.pi * float(allowed.diameter_mm[row]) * abs(float(rpm[lines[int(k)].executions[0][0]])) / 1000.0
+        for row, k in enumerate(allowed.index)
+        if allowed.cutting[row]
+    ]
+    return max(speeds, default=0.0)

@@ -6,9 +6,10 @@
 Everything is a value, so that a search that was stopped goes on from its last checkpoint and ends where it would have ended.
 """
 
+import itertools
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,7 @@ from twin.optimisation.margin import advance_of_words, margin
 from twin.optimisation.problem import Problem
 from twin.optimisation.question import Question, problem, single
 from twin.optimisation.resimulation import resimulated
-from twin.optimisation.rewriting import rewritten
+from twin.optimisation.rewriting import lines_executed, rewritten
 from twin.optimisation.rounding import rounded
 from twin.optimisation.seeds import closed_form, coarser, in_sequence, worth_of
 
@@ -81,7 +82,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
     hooks.progress(0.0, "reading the program")
     _check_lines(question)
     question = _followed(question.with_(margin=margin(question)))
-    for _ in range(FREEZES_MAX):
+    for freezes in itertools.count():
         made = problem(question)
         searched = search(question, hooks, checkpoint)
         genes, evaluations, chosen = _chosen(made, question, searched)
@@ -90,10 +91,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
         if not text.not_followed:
             break
-        question = question.with_(left_alone={**question.left_alone, **text.not_followed})
-    else:
-        line, why = next(iter(text.not_followed.items()))
-        raise OptimisationError(f"line {line + 1}: {why}; give it with --leave {line + 1}")
+        question = _with_left_alone(question, made, text.not_followed, freezes)
     again = None
     if resimulate:
         _go_on(hooks, 0.97, "simulating the rewritten program")
@@ -145,17 +143,37 @@ def _check_lines(question: Question) -> None:
 
 def _followed(question: Question) -> Question:
     """The question with the lines left alone whose words the control would not follow: found out before the search."""
-    for _ in range(FREEZES_MAX):
+    for freezes in itertools.count():
         made = problem(question)
+        if not made.genes:
+            break
         alone = single(question.objective)
         feed, rpm = rounded(made, *closed_form(made, alone), worth_of(made, alone))
         missed = rewritten(made, feed, rpm).not_followed
-        new = {line: why for line, why in missed.items() if line not in question.left_alone}
-        if not new:
-            return question
-        question = question.with_(left_alone={**question.left_alone, **new})
-    count = len(question.left_alone)
-    raise OptimisationError(f"{count} lines do not follow the words that are written for them; is this a macro program?")
+        if not missed:
+            break
+        question = _with_left_alone(question, made, missed, freezes)
+    return question
+
+
+def _with_left_alone(question: Question, made: Problem, missed: Mapping[int, str], freezes: int) -> Question:
+    """The question with these lines left alone; where they are already, with the line before them, which they take a word from.
+
+    freezes: how often this was done; from `FREEZES_MAX` on, all lines before them. Raises OptimisationError where none is left.
+    """
+    free = {line.line for line in made.program.lines if not line.left_alone}
+    new = {line: why for line, why in missed.items() if line in free}
+    order = lines_executed(made)
+    for line in () if new else missed:
+        places = [place for place, number in enumerate(order) if number == line]
+        for place in places:
+            before = list(dict.fromkeys(number for number in reversed(order[:place]) if number in free))
+            why = f"line {line + 1} behind it is left alone, and takes over what this one leaves in force"
+            new |= dict.fromkeys(before if freezes >= FREEZES_MAX else before[:1], why)
+    if not new:
+        line, why = next(iter(missed.items()))
+        raise OptimisationError(f"line {line + 1}: {why}, and no line before it is left that could be left alone for it")
+    return question.with_(left_alone={**question.left_alone, **new})
 
 
 def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched:

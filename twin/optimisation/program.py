@@ -25,6 +25,7 @@ from twin.optimisation.spring_passes import touching
 from twin.programs import Arc, Linear, Move
 from twin.programs.dialect import Dialect, SourceWords
 from twin.programs.discovery import dialect_of
+from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 
 Floats = NDArray[np.float64]
@@ -145,7 +146,7 @@ def programmed(
     if engagement is None and machine.stock is None:
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
     numbers, tools = tools_used(machine, path)
-    notes = tool_notes(machine, path)
+    notes = [*remarks(dialect, text, moves), *tool_notes(machine, path)]
     rows: PathRows | None = None
     sections = tool_sections(numbers, tools, unknown_start(path))
     collisions: tuple[int, ...] = ()

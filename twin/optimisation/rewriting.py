@@ -74,7 +74,7 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
 
 def _at_fault(problem: Problem, source: list[str], number: int, what: str) -> tuple[int, str]:
     """The line to be left alone for one that was missed, and why: itself, or the line before a call that takes no word."""
-    words, order = problem.program.words, _order(problem)
+    words, order = problem.program.words, lines_executed(problem)
     if words.with_feed(source[number], "1") == source[number] and words.feed_place(source[number]) is None and number in order:
         free = {line.line for line in problem.program.lines if not line.left_alone}
         for before in reversed(order[: order.index(number)]):
@@ -109,7 +109,7 @@ def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
     return wanted
 
 
-def _order(problem: Problem) -> list[int]:
+def lines_executed(problem: Problem) -> list[int]:
     """Source lines of all executions of feed lines, in their order."""
     runs = sorted((a, line.line) for line in problem.program.lines for a, _ in line.executions)
     return [line for _, line in runs]
@@ -121,12 +121,13 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, sou
     apart = _apart(problem, source)
     feeds |= {line.line for line in problem.program.lines if line.plain_feed and line.line in apart}
     speeds |= {number for number in apart & _of_one_speed(problem) if wanted[number].speed is not None}
+    kept = {line.line: line.word_mm_min for line in problem.program.lines if line.plain_feed}
     feed: float | None = None
-    for number in _order(problem):
+    for number in lines_executed(problem):
         one = wanted[number]
         if one.feed is not None and (one.feed_mm_min != feed or problem.program.words.feed_place(source[number]) is not None):
             feeds.add(number)
-        feed = one.feed_mm_min
+        feed = one.feed_mm_min if one.feed is not None else kept.get(number)
         if one.speed is not None and problem.program.words.speed_place(source[number]) is not None:
             speeds.add(number)
     now = 0.0

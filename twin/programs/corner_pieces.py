@@ -1,16 +1,45 @@
 """The piece between two pieces that meet at a corner: a chamfer or a rounding.
 
 A rounding is an arc touching both; its centre is where their parallels at its radius on the inner side cross. A chamfer is the
-straight line between the two points at its size from the corner.
+straight line between the two points at its size from the corner. `joined` puts such a piece between two motions.
 """
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from twin.programs.arcs import Point
-from twin.programs.planar import Piece, along, crossings, extent, left_of, parallel, shared, tangent
+from twin.programs.canonical import Motion, Position
+from twin.programs.pieces import placed, rebuilt, rounded, straight
+from twin.programs.planar import Piece, along, crossings, extent, left_of, parallel, shared, tangent, trimmed
 
 REACH_MM: Final = 1e-6
+STRAIGHT_RAD: Final = 1e-6
+"""Below this change of direction there is no corner."""
+
+
+class Joined(NamedTuple):
+    """A motion up to its corner, the corner, and what is left of the motion behind it; where the corner begins and ends."""
+
+    before: Motion
+    corner: Motion
+    behind: Motion
+    begin_mm: Position
+    end_mm: Position
+
+
+def joined(before: Motion, start_mm: Position, first: Piece, behind: Motion, second: Piece, between: Piece, plane: int) -> Joined:
+    """Return two motions of a plane with a piece between them.
+
+    start_mm: where the first motion begins; first, second: the pieces that they are in the plane
+    """
+    begin, end = placed(before.end_mm, between.start, plane), placed(before.end_mm, between.end, plane)
+    return Joined(
+        rebuilt(before, start_mm, trimmed(first, end=between.start), plane),
+        straight(before, end) if between.centre is None else rounded(before, begin, between, plane),
+        rebuilt(behind, end, trimmed(second, start=between.end), plane),
+        begin,
+        end,
+    )
 
 
 def chamfer(first: Piece, second: Piece, size_mm: float) -> Piece | None:

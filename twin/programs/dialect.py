@@ -80,6 +80,7 @@ class Dialect:
     speed_per_tool: the speed stands in the block that calls the tool, and in no other: the optimiser chooses one for each tool
     blocks_are_numbered: the control numbers every block of a text, and names it by that number rather than by its line
     m_codes: M codes that have a meaning of their own in this language, which a machine builder's cannot take
+    end, start: the words that end a program and that start the spindle, as a sentence names them
     """
 
     name: str
@@ -90,5 +91,7 @@ class Dialect:
     interpret: Callable[[str, Settings], list[Move]]
     words: SourceWords
     m_codes: frozenset[int]
+    end: str = "M30"
+    start: str = "S and M3 or M4"
     speed_per_tool: bool = False
     blocks_are_numbered: bool = False

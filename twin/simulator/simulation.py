@@ -19,8 +19,10 @@ from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
-from twin.programs import FeedForward, Settings, interpret
+from twin.programs import FeedForward, Settings
 from twin.programs.called import with_line_elsewhere
+from twin.programs.discovery import dialect_of
+from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond
@@ -39,7 +41,8 @@ class Simulation:
     """A run of the simulated machine.
 
     run: what it records, at the servo period; response: with the spread of its courses; plan: with the times of each line
-    notes: what the machine description did not say, and what was taken for it; learned_s: seconds that learned terms add
+    notes: remarks on the program; what the machine description did not say, and what was taken for it
+    learned_s: seconds that learned terms add
     """
 
     run: RunLog
@@ -80,9 +83,11 @@ def simulate(
     Raises PartProgramError where a control would refuse the program, MachineError where the machine lacks its axes or the run
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
-    notes: list[str] = []
     settings = program_settings(machine) if settings is None else settings
-    moves = with_line_elsewhere(interpret(text, settings), len(source_lines(text)))
+    dialect = dialect_of(text, settings)
+    own = dialect.interpret(text, settings)
+    notes = [*remarks(dialect, text, own)]
+    moves = with_line_elsewhere(own, len(source_lines(text)))
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
@@ -172,7 +177,9 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     if path.axes[:3] != ("x", "y", "z") or not len(path):
         return none
     if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
-        notes.append(f"the program changes tools; all of them are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]")
+        one = f"the {machine.tool.diameter_mm:g} mm one of [tool]"
+        beside = "; expect and optimise take each [tools.N]" if machine.tools else ""
+        notes.append(f"the program changes tools, and this run cuts with {one} throughout{beside}")
     rows = engaged_along(path, machine.stock, [Section(0, len(path), machine.tool.diameter_mm)])
     for hit in rows.collisions[:3]:
         line = int(path.line[hit.segment]) + 1

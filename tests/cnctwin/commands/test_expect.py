@@ -60,6 +60,22 @@ def test_tools_of_a_file_and_lines_as_the_control_counts_them(folder: Path) -> N
     assert made.basis[0] == "lines counted from 1, tools 2"
 
 
+def test_programs_that_differ_in_their_ending_alone_do_not_overwrite_one_another(folder: Path) -> None:
+    (folder / "O0012.mpf").write_text("N10 S4000 M3\nN20 G1 X5 F500\nN30 M30\n", encoding="utf-8")
+    (folder / "more").mkdir()
+    (folder / "more" / "O12.mpf").write_text("N10 S4000 M3\nN20 G1 X5 F500\nN30 M30\n", encoding="utf-8")
+    where = ["--machine", str(folder / "small.toml"), "--out", str(folder / "out")]
+    both = CliRunner().invoke(app, ["expect", str(folder / "O12.nc"), str(folder / "O0012.mpf"), *where])
+    assert both.exit_code != 0
+    assert "O12.nc and O0012.mpf are one program" in str(both.exception)
+    assert not (folder / "out").exists()
+    run(folder)
+    before = (folder / "out" / "small" / "O12.json").read_bytes()
+    later = CliRunner().invoke(app, ["expect", str(folder / "more" / "O12.mpf"), *where, "--fresh"])
+    assert "O12.nc and O12.mpf are one program" in str(later.exception)
+    assert (folder / "out" / "small" / "O12.json").read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("more", "why"),
     [

@@ -56,3 +56,31 @@ def test_a_call_gets_no_word(between: str) -> None:
     assert (cycle.after.feed_mm_min, cycle.after.spindle_rpm) == (cycle.before.feed_mm_min, 5000.0)
     cut = next(one for one in found.lines if one.cut_mm > 0.0 and not one.left_alone)
     assert cut.after.spindle_rpm != 5000.0
+
+
+APPROACH = KLARTEXT.replace("4 L X+25 Y+30 RL F600 M109", "4 L Z-1 R0 F500\n5 APPR LT X+25 Y+30 LEN10 RL F600").replace(
+    "X0 Y20", "X-60 Y-40"
+)
+
+
+def test_a_line_that_runs_at_what_another_leaves_has_that_one_left_alone_too() -> None:
+    """The first move of APPR has the feed of the block before, the second its own F: no word of APPR gives it both."""
+    found = answer(APPROACH, "a.h", force_limit_n=60.0)
+    why = {one.line: one.left_alone for one in found.lines}
+    assert "feed does not follow" in why[5]
+    assert why[4].startswith("line 6 behind it is left alone")
+    assert [written for written in source_lines(found.program) if "APPR" in written or "Z-1" in written] == [
+        "4 L Z-1 R0 F500",
+        "5 APPR LT X+25 Y+30 LEN10 RL F600",
+    ]
+    assert any("line 5 (line 6 behind it" in note for note in found.notes)
+    assert found.after.seconds < found.before.seconds
+
+
+HOLES = HEAD + "Y35\nG1 X130 F600\nG0 Z50\nS3000 M3 F200\nMCALL CYCLE81(50,6,2,-2)\nX60 Y60\nX70\nMCALL\nM30\n"
+
+
+def test_holes_of_a_modal_cycle_get_no_words_that_are_in_force_already() -> None:
+    written = source_lines(answer(HOLES, "a.mpf").program)
+    assert written[-6:] == source_lines(HOLES)[-6:]
+    assert written[7] != "G1 X130 F600"

@@ -108,7 +108,7 @@ def test_a_line_that_cannot_be_read_is_refused_with_line_and_word(dialect: Diale
 
 @every_dialect
 def test_a_program_without_an_end_is_an_error(dialect: Dialect) -> None:
-    with pytest.raises(PartProgramError, match=r"^line \d+: "):
+    with pytest.raises(PartProgramError, match=r"^(line \d+|block \d+ \(line \d+\)): "):
         dialect.interpret(text_of(dialect, "endless"), SETTINGS)
 
 

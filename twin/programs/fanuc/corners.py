@@ -3,19 +3,15 @@
 Both belong to the block that names them.
 """
 
-from typing import Final
-
 from twin.programs.canonical import Arc, ExactStop, Linear, Motion, Position
-from twin.programs.corner_pieces import REACH_MM, chamfer, rounding
+from twin.programs.corner_pieces import REACH_MM, STRAIGHT_RAD, chamfer, joined, rounding
 from twin.programs.fanuc.block import Words
 from twin.programs.fanuc.compensation import note
 from twin.programs.fanuc.state import PendingCorner, State
-from twin.programs.pieces import piece, placed, rebuilt, rounded, straight
-from twin.programs.planar import extent, trimmed, turn_between
+from twin.programs.pieces import piece
+from twin.programs.planar import extent, turn_between
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import IntegerWords
-
-STRAIGHT_RAD: Final = 1e-6
 
 
 def begin(state: State, words: Words, start: Position) -> None:
@@ -50,15 +46,11 @@ def close(state: State, move: Motion) -> Motion:
     found = chamfer(first, second, pending.size_mm) if pending.kind == "C" else rounding(first, second, pending.size_mm, turn)
     if found is None:
         raise RefusedError(pending.text, f"{pending.size_mm:g} mm do not fit between these two moves; a smaller one fits")
-    between = found
-    shorter = rebuilt(kept, pending.start_mm, trimmed(first, end=between.start), plane)
-    state.out[pending.at] = shorter
-    corner_start = placed(kept.end_mm, between.start, plane)
-    corner_end = placed(kept.end_mm, between.end, plane)
-    put = straight(kept, corner_end) if between.centre is None else rounded(kept, corner_start, between, plane)
-    insert(state, pending.at + 1, put)
-    state.position = corner_end
-    return rebuilt(move, corner_end, trimmed(second, start=between.end), plane)
+    parts = joined(kept, pending.start_mm, first, move, second, found, plane)
+    state.out[pending.at] = parts.before
+    insert(state, pending.at + 1, parts.corner)
+    state.position = parts.end_mm
+    return parts.behind
 
 
 def insert(state: State, at: int, move: Motion) -> None:

@@ -6,6 +6,7 @@ from typing import Final
 from twin.programs.fanuc.block import LENGTH_LETTERS, Block, Kind, Words
 from twin.programs.fanuc.text import Section, Text
 from twin.programs.fanuc.variables import Variables
+from twin.programs.jumps import JumpCount
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
 
@@ -44,15 +45,15 @@ class Level:
     modal_call: bool = False
 
 
-class Flow:
+class Flow(JumpCount):
     """The stack of running programs, the innermost last, and the counts that bound them."""
 
-    __slots__ = ("jumps", "levels", "modal_calls", "settings", "texts", "variables")
+    __slots__ = ("levels", "modal_calls", "texts", "variables")
 
     def __init__(self, text: Text, settings: Settings, variables: Variables) -> None:
-        self.settings, self.variables = settings, variables
+        super().__init__(settings)
+        self.variables = variables
         self.texts: dict[int, Text] = {}
-        self.jumps = 0
         main = text.sections[0]
         self.levels = [Level(text, main, main.start)]
         self.modal_calls: list[ModalCall] = []
@@ -60,12 +61,6 @@ class Flow:
     @property
     def level(self) -> Level:
         return self.levels[-1]
-
-    def count(self) -> None:
-        """One more jump backwards, loop or call. RefusedError where there are too many: the program has no end."""
-        self.jumps += 1
-        if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
 
     def statement(self, block: Block) -> None:
         """Run a block that is no list of words; `at` of the level is the block's own line."""
@@ -115,8 +110,7 @@ class Flow:
 
     def call(self, number: int, repeats: int, word: str, arguments: dict[int, float] | None, modal: bool = False) -> None:
         """Begin a program; with arguments it gets variables of its own. The caller goes on behind its block."""
-        if len(self.levels) > self.settings.call_depth_max:
-            raise RefusedError(word, f"calls are nested deeper than {self.settings.call_depth_max}; Settings.call_depth_max")
+        self.check_depth(len(self.levels), word)
         text, section = self.find(number, word)
         self.count()
         if repeats < 1:

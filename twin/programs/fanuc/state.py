@@ -3,14 +3,14 @@
 It is the one thing that changes while a program runs; functions of the other files take it and change it, block by block.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
-from twin.programs.canonical import Move, Position, ToolLength
+from twin.programs.canonical import Position, ToolLength
 from twin.programs.cutter_path import CompensatedSection
 from twin.programs.fanuc.block import Words
 from twin.programs.fanuc.coordinates import Coordinates
+from twin.programs.put_out import PutOut
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import IntegerWords, Settings, ToolOffset
 
@@ -79,7 +79,7 @@ class Compensation(CompensatedSection):
     leaving: bool = False
 
 
-class State:
+class State(PutOut):
     """See the file's docstring. `out` is what moves go to now: `moves`, or the buffer of the cutter compensation."""
 
     __slots__ = (
@@ -92,18 +92,13 @@ class State:
         "feed_word",
         "length_is_due",
         "length_number",
-        "line",
         "modal",
-        "moves",
-        "out",
         "pole",
         "position",
         "preselected",
-        "program",
         "radius_number",
         "rigid",
         "rpm",
-        "settings",
         "skip_position",
         "speed_max",
         "speed_word",
@@ -120,14 +115,14 @@ class State:
         self.axes = settings.axes
         self.position: Position = settings.start_mm or (0.0,) * len(settings.axes)
         self.skip_position = self.position
-        self.moves: list[Move] = []
+        self.moves = []
         self.out = self.moves
         self.corner: PendingCorner | None = None
         self.compensation: Compensation | None = None
         self.cycle: CycleData | None = None
         self.pole: PolarPole | None = None
         self.line = 0
-        self.program: str | None = None
+        self.program = None
         self.feed_word = 0.0
         self.feed_per_rev_mm: float | None = None
         self.rpm = self.speed_word = 0.0
@@ -170,12 +165,6 @@ class State:
         fine = letter in words.integers and self.settings.integer_words is IntegerWords.INCREMENTS
         return value * 0.001 if fine else value
 
-    def emit(self, move: Move) -> None:
-        """Put out what is not a motion."""
-        self.out.append(move)
-        if len(self.out) > self.settings.moves_max:
-            raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
-
     def take_length(self) -> None:
         """Say the tool length before the first move that is told where z goes since it changed: that move contains it."""
         if self.length_is_due:
@@ -194,9 +183,3 @@ class State:
         if self.rpm <= 0.0 or self.spindle_direction == 0:
             raise RefusedError("", "feed per revolution (G95) needs a turning spindle; write S and M3 before")
         return self.feed_word * self.rpm, self.feed_word
-
-    def checked(self, position: Position) -> Position:
-        """`position`, if a machine could be there."""
-        if not all(map(math.isfinite, position)):
-            raise RefusedError("", "the end of this move is beyond any machine")
-        return position

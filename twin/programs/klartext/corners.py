@@ -3,17 +3,13 @@
 The feed of such a block holds for the corner alone (User's Manual TNC 640, "Rounded corners RND", "Inserting a chamfer CHF").
 """
 
-from typing import Final
-
 from twin.programs.canonical import Arc, Linear, Motion, Rapid
-from twin.programs.corner_pieces import REACH_MM, chamfer, rounding
+from twin.programs.corner_pieces import REACH_MM, STRAIGHT_RAD, chamfer, joined, rounding
 from twin.programs.klartext import compensation
 from twin.programs.klartext.state import PendingCorner, State
-from twin.programs.pieces import piece, placed, rebuilt, rounded, straight
-from twin.programs.planar import extent, trimmed, turn_between
+from twin.programs.pieces import piece
+from twin.programs.planar import extent, turn_between
 from twin.programs.refusal import RefusedError
-
-STRAIGHT_RAD: Final = 1e-6
 
 
 def begin(state: State, rounds: bool, size_mm: float, feed_mm_min: float | None, text: str) -> None:
@@ -50,16 +46,14 @@ def close(state: State, move: Motion) -> Motion:
     if between is None:
         reason = f"{pending.size_mm:g} mm do not fit between these two moves; a smaller one fits"
         raise RefusedError(pending.text, reason, (pending.line, state.program))
-    state.out[pending.at] = rebuilt(kept, pending.start_mm, trimmed(first, end=between.start), plane)
-    corner_start = placed(kept.end_mm, between.start, plane)
-    corner_end = placed(kept.end_mm, between.end, plane)
-    put = straight(kept, corner_end) if between.centre is None else rounded(kept, corner_start, between, plane)
+    parts = joined(kept, pending.start_mm, first, move, second, between, plane)
+    state.out[pending.at], put = parts.before, parts.corner
     assert not isinstance(put, Rapid)
     put = put._replace(line=pending.line, feed_mm_min=pending.feed_mm_min or put.feed_mm_min)
-    state.position = corner_start
+    state.position = parts.begin_mm
     insert(state, pending.at + 1, compensation.at_the_edge(state, put))
-    state.position = corner_end
-    return rebuilt(move, corner_end, trimmed(second, start=between.end), plane)
+    state.position = parts.end_mm
+    return parts.behind
 
 
 def insert(state: State, at: int, move: Motion) -> None:

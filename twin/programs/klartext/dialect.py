@@ -32,6 +32,8 @@ DIALECT = Dialect(
     interpret=interpret,
     words=words,
     m_codes=CODES,
+    end="END PGM",
+    start="S in TOOL CALL and M3 or M4",
     speed_per_tool=True,
     blocks_are_numbered=True,
 )

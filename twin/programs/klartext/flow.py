@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import PureWindowsPath
 
 from twin.programs.called import NOT_AT_HAND
+from twin.programs.jumps import JumpCount
 from twin.programs.klartext.source import Text
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
@@ -25,16 +26,15 @@ class Level:
     caller_unit_mm: float = 1.0
 
 
-class Flow:
+class Flow(JumpCount):
     """The stack of running levels, the innermost last, and the counts that bound them."""
 
-    __slots__ = ("ended", "jumps", "levels", "settings", "texts")
+    __slots__ = ("ended", "levels", "texts")
 
     def __init__(self, text: Text, settings: Settings) -> None:
-        self.settings = settings
+        super().__init__(settings)
         self.levels = [Level(text, 0, program=True)]
         self.texts: dict[str, Text] = {}
-        self.jumps = 0
         self.ended = False
 
     @property
@@ -46,16 +46,9 @@ class Flow:
         """Return True inside a program that another one called."""
         return sum(level.program for level in self.levels) > 1
 
-    def count(self) -> None:
-        """One more jump or call. RefusedError where there are too many: the program has no end."""
-        self.jumps += 1
-        if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
-
     def deeper(self, word: str) -> None:
         self.count()
-        if len(self.levels) > self.settings.call_depth_max:
-            raise RefusedError(word, f"calls are nested deeper than {self.settings.call_depth_max}; Settings.call_depth_max")
+        self.check_depth(len(self.levels), word)
 
     def jump(self, label: str, word: str) -> None:
         """Go on at a label of the running program."""
@@ -103,6 +96,10 @@ class Flow:
                 raise RefusedError(word, f"there is no program {stem} here; {NOT_AT_HAND}")
             self.texts[stem] = Text(text, stem)
         return self.texts[stem]
+
+    def text_of(self, program: str | None) -> Text:
+        """Return the text of that name; None = the main program."""
+        return self.levels[0].text if program is None else self.texts[program]
 
     def leave(self) -> Level | None:
         """END PGM or the end of a text: back to the caller; returns what was left, None in the main program."""

@@ -35,7 +35,8 @@ class Interpreter:
                 self.block()
         except RefusedError as refused:
             line, program = refused.place or (self.state.line, self.state.program)
-            raise PartProgramError(line + 1, refused.word, refused.reason, program) from None
+            block = self.flow.text_of(program).number_at(line)
+            raise PartProgramError(line + 1, refused.word, refused.reason, program, block) from None
         return self.state.moves
 
     def block(self) -> None:
@@ -56,11 +57,15 @@ class Interpreter:
         known = self.commands.setdefault(text.name, {})
         command = known.get(at)
         if command is None:
-            command = known[at] = compiled(source, self.settings.bracket_depth_max)
+            try:
+                command = known[at] = compiled(source, self.settings.bracket_depth_max)
+            except RefusedError as refused:
+                line = source.line if refused.place is None else refused.place[0]
+                raise RefusedError(refused.word, refused.reason, (line, text.name)) from None
         command(state)
 
     def ran_out(self) -> None:
-        """The last block is passed: END PGM is missing, which the twin does not mind in the main program."""
+        """The last block is passed: END PGM is missing, which `remarks` says of the main program."""
         if not self.flow.level.program:
             raise RefusedError("", "the subprogram ends without LBL 0")
         if not self.state.leave_program():

@@ -6,12 +6,13 @@ the control.
 """
 
 import re
+from bisect import bisect_right
 from typing import Final, NamedTuple
 
 from twin.programs.refusal import RefusedError
 
 CAPITALS: Final = {code: code - 32 for code in range(ord("a"), ord("z") + 1)}
-NUMBER: Final = re.compile(r"[ \t]*+(?:N?+[0-9]++(?=[ \t]|$)[ \t]*+)?+")
+NUMBER: Final = re.compile(r"[ \t]*+(?:N?+([0-9]++)(?=[ \t]|$)[ \t]*+)?+")
 COMMENT: Final = re.compile(r"[^;\"]*+(?:\"[^\"]*+\"?+[^;\"]*+)*+")
 CYCLE: Final = re.compile(r"(?:CYCL DEF|TCH PROBE)[ \t]++[0-9]++(?![.0-9])")
 PARAMETER_LINE: Final = re.compile(r"Q([0-9]++)[ \t]*+=[ \t]*+(?![^;]*[()*/^]|Q?[-+0-9.,]+[ \t]+[-+])")
@@ -20,11 +21,12 @@ CYCLE_PARAMETER_MIN: Final = 200
 
 
 class Part(NamedTuple):
-    """One line of a block: index in the text, what is left without number and comment in capitals, and as written."""
+    """One line of a block: index in the text, what is left without number and comment in capitals, and as written; its number."""
 
     line: int
     body: str
     written: str
+    number: int | None = None
 
 
 class Source(NamedTuple):
@@ -58,6 +60,11 @@ class Text:
             raise RefusedError(word, f"there is no LBL {label} in this program")
         return self.labels[label]
 
+    def number_at(self, line: int) -> int | None:
+        """Return the number of the block that a line is in, by which the control names it; None where it has none."""
+        at = bisect_right(self.sources, line, key=lambda source: source.line) - 1
+        return self.sources[at].parts[0].number if at >= 0 else None
+
 
 def unit_of(body: str) -> str | None:
     """The last word of BEGIN PGM and END PGM, where it is a unit.
@@ -79,12 +86,12 @@ def label_of(source: Source) -> str | None:
     return source.written[match.start(1) : match.end(1)]
 
 
-def part_of(line: str, at: int) -> tuple[Part, bool, bool, bool]:
-    """A line without number and comment; and whether it had a number, is indented, goes on in the next line."""
+def part_of(line: str, at: int) -> tuple[Part, bool, bool]:
+    """A line without number and comment; and whether it is indented, and goes on in the next line."""
     capitals = line.translate(CAPITALS)
     number = NUMBER.match(capitals)
     begin = number.end() if number is not None else 0
-    numbered = bool(line[:begin].strip())
+    own = int(number[1][:9]) if number is not None and number[1] is not None else None
     end_match = COMMENT.match(capitals, begin)
     end = end_match.end() if end_match is not None else len(line)
     goes_on = capitals.rstrip().endswith("~")
@@ -95,7 +102,7 @@ def part_of(line: str, at: int) -> tuple[Part, bool, bool, bool]:
         cut = body.rstrip()[:-1]
         body, written = cut, written[: len(cut)]
     kept = len(body.rstrip())
-    return Part(at, body[:kept], written[:kept]), numbered, line[:1] in (" ", "\t"), goes_on
+    return Part(at, body[:kept], written[:kept], own), line[:1] in (" ", "\t"), goes_on
 
 
 def blocks(text: str) -> list[Source]:
@@ -106,8 +113,8 @@ def blocks(text: str) -> list[Source]:
         if not line.strip() or line.strip() == "%":
             goes_on = False
             continue
-        part, numbered, indented, continues = part_of(line.lstrip("\ufeff"), at)
-        if goes_on or (found and not numbered and belongs(found[-1], part, indented)):
+        part, indented, continues = part_of(line.lstrip("\ufeff"), at)
+        if goes_on or (found and part.number is None and belongs(found[-1], part, indented)):
             if part.body:
                 found[-1].append(part)
         elif part.body:
@@ -134,5 +141,5 @@ def source_of(parts: list[Part]) -> Source:
         written, body = written[len(written) - len(kept) :], kept
         first = parts[0]
         rest = first.body[1:].lstrip()
-        parts = [Part(first.line, rest, first.written[len(first.written) - len(rest) :]), *parts[1:]]
+        parts = [Part(first.line, rest, first.written[len(first.written) - len(rest) :], first.number), *parts[1:]]
     return Source(parts[0].line, body, written, tuple(parts), skip)

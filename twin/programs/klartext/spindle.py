@@ -1,12 +1,8 @@
 """The spindle: M3, M4, M5, M13, M14, and the speed of TOOL CALL."""
 
-from typing import Final
-
 from twin.programs.canonical import Coolant, Spindle, SpindleOrient
 from twin.programs.klartext.state import State
-from twin.programs.refusal import RefusedError
-
-RPM_MAX: Final = 1_000_000.0
+from twin.programs.spindle_speed import checked_speed
 
 
 def turn(state: State, direction: int) -> None:
@@ -19,9 +15,7 @@ def turn(state: State, direction: int) -> None:
 
 def set_speed(state: State, rpm: float, text: str) -> None:
     """S of TOOL CALL. A spindle that turns takes it up at once."""
-    if not 0.0 <= rpm <= RPM_MAX:
-        raise RefusedError(text, f"a spindle speed is from 0 to {RPM_MAX:g}; its direction is M3 or M4")
-    changes = rpm != state.rpm
+    changes = checked_speed(rpm, text) != state.rpm
     state.rpm = rpm
     if changes and state.spindle_direction:
         turn(state, state.spindle_direction)

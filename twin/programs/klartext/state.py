@@ -3,12 +3,11 @@
 It is the one thing that changes while a program runs; functions of the other files take it and change it, block by block.
 """
 
-import math
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from twin.programs.canonical import Motion, Move, Position, ToolLength
+from twin.programs.canonical import Motion, Position, ToolLength
 from twin.programs.cutter_path import CompensatedSection
 from twin.programs.klartext.cycles.definition import Definition
 from twin.programs.klartext.flow import Flow
@@ -16,6 +15,7 @@ from twin.programs.klartext.frame import Frame
 from twin.programs.klartext.source import Text
 from twin.programs.klartext.variables import Variables
 from twin.programs.planes import PLANES
+from twin.programs.put_out import PutOut
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings, ToolOffset
 
@@ -82,7 +82,7 @@ class Tool:
     feed_mm_min: float | None = None
 
 
-class State:
+class State(PutOut):
     """See the file's docstring. `out` is what moves go to now: `moves`, or the section of the radius compensation."""
 
     __slots__ = (
@@ -102,20 +102,15 @@ class State:
         "last_rapid",
         "left_mm",
         "length_is_due",
-        "line",
-        "moves",
         "open_corners",
-        "out",
         "pattern",
         "per_revolution",
         "plane",
         "plunge_factor",
         "pole",
         "position",
-        "program",
         "rpm",
         "selected",
-        "settings",
         "shortest_rotary",
         "side",
         "spindle_direction",
@@ -135,12 +130,12 @@ class State:
         self.frame = Frame(settings)
         self.variables = Variables(settings.parameters, self.system_parameter)
         self.position: Position = settings.start_mm or (0.0,) * len(settings.axes)
-        self.moves: list[Move] = []
+        self.moves = []
         self.out = self.moves
         self.plane = 17
         self.unit_mm = MM_PER_INCH if settings.inch else 1.0
         self.line = 0
-        self.program: str | None = None
+        self.program = None
         self.feed_mm_min = 0.0
         self.feed_per_rev_mm: float | None = None
         self.per_revolution = False
@@ -179,12 +174,6 @@ class State:
         """One unit of a programmed feed, mm/min."""
         return INCH_FEED if self.unit_mm != 1.0 else 1.0
 
-    def emit(self, move: Move) -> None:
-        """Put out a move."""
-        self.out.append(move)
-        if len(self.out) > self.settings.moves_max:
-            raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
-
     def take_length(self) -> None:
         """Report the tool length before the first move that is told where the tool's axis goes since it changed."""
         if self.length_is_due:
@@ -210,12 +199,6 @@ class State:
         if self.feed_mm_min <= 0.0:
             raise RefusedError("", "this cut has no feed; write F in this block or before")
         return self.feed_mm_min, None
-
-    def checked(self, position: Position) -> Position:
-        """`position`, if a machine could be there."""
-        if not all(map(math.isfinite, position)):
-            raise RefusedError("", "the end of this move is beyond any machine")
-        return position
 
     def tool_offset(self, text: str) -> ToolOffset:
         """The line of the tool table of the tool in the spindle; an empty one where there is no table at all."""

@@ -21,7 +21,6 @@ GOES: Final = re.compile(r"I?+(?:[XYZABCUVW]|P[RA])")
 TOOL_CALL: Final = re.compile(r"TOOL CALL(?:[ \t]++\"[^\"]*+\")?+")
 PLAIN: Final = re.compile(r"[-+]?[ \t]*[0-9.,]+")
 BRANCHES: Final = re.compile(r"/|LBL|CALL[ \t]|FN[ \t]*+(?:9|1[0-2])[ \t]*+:|STOP")
-NUMBER: Final = re.compile(r"[ \t]*+N?+([0-9]++)(?=[ \t]|$)")
 OWNERS: Final = frozenset({103, 112, 124, 128, 140})
 """M functions that take F, T or A for themselves."""
 SPINDLE: Final = frozenset({3, 4, 13, 14})
@@ -233,5 +232,4 @@ def block_number(line: str) -> int | None:
     >>> block_number("12 L X+5"), block_number("L X+5")
     (12, None)
     """
-    found = NUMBER.match(line.translate(CAPITALS))
-    return None if found is None else int(found[1][:9])
+    return part_of(line, 0)[0].number

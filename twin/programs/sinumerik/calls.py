@@ -38,8 +38,7 @@ def call(
     found = find(flow, name)
     if found is None:
         raise RefusedError(word, UNKNOWN)
-    if len(flow.levels) > flow.settings.call_depth_max:
-        raise RefusedError(word, f"calls are nested deeper than {flow.settings.call_depth_max}; Settings.call_depth_max")
+    flow.check_depth(len(flow.levels), word)
     if not 0 <= repeats <= flow.settings.repeats_max:
         raise RefusedError("P", f"repeats from 0 to {flow.settings.repeats_max} times")
     flow.count()

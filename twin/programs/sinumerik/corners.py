@@ -8,17 +8,15 @@ import math
 from typing import Final, NamedTuple
 
 from twin.programs.canonical import Arc, ExactStop, Linear, Motion, Position, Rapid
-from twin.programs.corner_pieces import chamfer, rounding
-from twin.programs.pieces import piece, placed, rebuilt, rounded, straight
-from twin.programs.planar import extent, trimmed, turn_between
+from twin.programs.corner_pieces import REACH_MM, STRAIGHT_RAD, chamfer, joined, rounding
+from twin.programs.pieces import piece
+from twin.programs.planar import extent, turn_between
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.codes import CONTOUR_CODES
 from twin.programs.sinumerik.compensation import note
 from twin.programs.sinumerik.state import PendingCorner, State
 from twin.programs.sinumerik.words import Words
 
-STRAIGHT_RAD: Final = 1e-6
-REACH_MM: Final = 1e-6
 NAMES: Final = ("CHF", "CHR", "RND")
 
 
@@ -119,15 +117,13 @@ def close(state: State, move: Motion) -> Motion:
         if pending.is_modal:
             return move
         raise RefusedError(pending.text, f"{pending.size_mm:g} mm do not fit between these two moves; a smaller one fits")
-    state.out[pending.at] = rebuilt(before, pending.start_mm, trimmed(first, end=found.start), plane)
-    corner_start = placed(before.end_mm, found.start, plane)
-    corner_end = placed(before.end_mm, found.end, plane)
-    put = straight(before, corner_end) if found.centre is None else rounded(before, corner_start, found, plane)
+    parts = joined(before, pending.start_mm, first, move, second, found, plane)
+    state.out[pending.at], put = parts.before, parts.corner
     if pending.feed_mm_min is not None and not isinstance(put, Rapid):
         put = put._replace(feed_mm_min=pending.feed_mm_min)
     insert(state, pending.at + 1, put)
-    state.position = corner_end
-    return rebuilt(move, corner_end, trimmed(second, start=found.end), plane)
+    state.position = parts.end_mm
+    return parts.behind
 
 
 def insert(state: State, at: int, move: Motion) -> None:

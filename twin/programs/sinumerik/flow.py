@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Final
 
+from twin.programs.jumps import JumpCount
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings
 from twin.programs.sinumerik.language.functions import Value, as_text, as_whole, is_true
@@ -55,13 +56,14 @@ class Level:
     saved: object = None
 
 
-class Flow:
+class Flow(JumpCount):
     """The stack of running programs, the innermost last, and the counts that bound them."""
 
-    __slots__ = ("jumps", "levels", "modal", "settings", "texts", "variables")
+    __slots__ = ("levels", "modal", "texts", "variables")
 
     def __init__(self, text: Text, settings: Settings, variables: Variables) -> None:
-        self.settings, self.variables, self.jumps = settings, variables, 0
+        super().__init__(settings)
+        self.variables = variables
         self.texts: dict[str, Text] = {}
         main = text.main
         self.levels = [Level(text, main, main.start, variables.local)]
@@ -70,12 +72,6 @@ class Flow:
     @property
     def level(self) -> Level:
         return self.levels[-1]
-
-    def count(self) -> None:
-        """One more jump, loop or call. RefusedError where there are too many: the program has no end."""
-        self.jumps += 1
-        if self.jumps > self.settings.jumps_max:
-            raise RefusedError("", f"more than {self.settings.jumps_max} jumps: the program has no end; look at its loops")
 
     def jump(self, target: Target) -> None:
         """Go on at a label or a block number of the running program; GOTOC goes on behind its block where there is none."""

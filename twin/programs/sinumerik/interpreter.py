@@ -190,8 +190,14 @@ class Interpreter:
             name = program_name(as_text(statement.name(self.variables)))
             calls.call(flow, name, statement.text, statement.arguments)
         elif isinstance(statement, Return):
-            return self.returns()
+            return self.ended() if len(flow.levels) == 1 else self.returns()
         return True
+
+    def ended(self) -> bool:
+        """M2, M30, and in the main program M17 and RET: False, for nothing runs any more."""
+        self.finish()
+        self.state.emit(ProgramEnd(self.state.line, self.state.program))
+        return False
 
     def words(self, statement: Words) -> bool:
         """Run a list of words with the calls and ends in it; False at the end of the program."""
@@ -202,7 +208,8 @@ class Interpreter:
             flow.modal = statement.modal
             return True
         words = evaluated(statement.parts, self.variables, flow.assign)
-        beside = next(iter([*words.written.values(), *(one.text for name, one in words.values.items() if name != "P")]), None)
+        others = [*words.written.values(), *(one.text for name, one in words.values.items() if name != "P")]
+        beside = next(iter([*others, *(f"M{code}" for code in words.m)]), None)
         if words.calls and beside is not None:
             raise RefusedError(beside, f"stands beside the call of {words.calls[0].name}; a call has a block of its own")
         moved = modes.execute(state, words)
@@ -216,9 +223,7 @@ class Interpreter:
             self.call(flow.modal, 1, is_modal=True)
         for code in words.m:
             if code in ENDS or (code == 17 and len(flow.levels) == 1):
-                self.finish()
-                state.emit(ProgramEnd(state.line, state.program))
-                return False
+                return self.ended()
             if code == 17:
                 return self.returns()
         return True

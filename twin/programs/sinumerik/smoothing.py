@@ -14,7 +14,7 @@ from twin.programs.sinumerik.words import Words
 
 OFF: Final = -1.0
 """CTOL=-1 gives the tolerance back to the machine."""
-MODE_MAX: Final = 999_999
+MODE_MAX: Final = 9_999_999
 
 
 def modes(state: State, words: Words) -> None:
@@ -73,8 +73,9 @@ def changed(state: State, before: tuple[float | None, float | None]) -> None:
 def high_speed(state: State, given: list[Value | None]) -> None:
     """CYCLE832(tolerance, mode, ...): continuous path with that tolerance; without figures, or with mode 0, the machine's.
 
-    The last digit of the mode is the kind of cut: 0 off, 1 finishing, 2 semi-finishing, 3 roughing. With 1 in the tens, the third
-    figure is the tolerance of rotary axes.
+    The last digit of the mode is the kind of cut: 0 off, 1 finishing, 2 semi-finishing, 3 roughing, 4 smooth finishing. With 1 in
+    the tens, the third figure is the tolerance of rotary axes. What else the machine's builder has it switch (CUST_832: SOFT or
+    BRISK, FFWON, a compressor) is not known: the jerk limit stays as it was.
     """
     if any(isinstance(value, str) for value in given):
         raise RefusedError("CYCLE832", "its figures are numbers")

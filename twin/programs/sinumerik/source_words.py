@@ -205,10 +205,13 @@ def inch_lines(lines: list[str], inch: bool = False) -> list[bool]:
 def branches(lines: list[str]) -> list[bool]:
     """Return True for each line that the control may come to, or go on from, another way than from line to line.
 
-    Block skips, jumps and what they aim at, structures, repetitions, calls by name, and the blocks behind which MCALL calls.
+    Block skips, jumps and what they aim at, structures, repetitions, calls by name, and the blocks behind which MCALL calls one;
+    a cycle of the control comes back to where it was called.
 
     >>> branches(["G1 X3", "/N20 G1 X4", "LAB: X5", "SUB1 P2", "GOTOB LAB"])
     [False, True, True, True, True]
+    >>> branches(["MCALL SUB1", "X5", "MCALL", "MCALL CYCLE81(9,0,1,-5)", "X5", "MCALL"])
+    [True, True, True, False, False, False]
     """
     marked: list[tuple[bool, str]] = []
     jumps = modal = False
@@ -219,9 +222,10 @@ def branches(lines: list[str]) -> list[bool]:
         leads = any(name in STATEMENTS and name not in NO_BRANCH for name in names)
         jumps = jumps or any(name.startswith(("GOTO", "REPEAT")) for name in names)
         own = next((name for name in names if calls(name, upper)), None)
+        was_modal = modal
         if "MCALL" in names:
-            modal = len(names) > 1
-        marked.append((upper.lstrip().startswith(("/", "%")) or leads or own is not None or modal or "MCALL" in names, upper))
+            modal = any(name != "MCALL" and not CALLS_NOTHING.match(name) for name in names)
+        marked.append((upper.lstrip().startswith(("/", "%")) or leads or own is not None or modal or was_modal, upper))
     return [one or (jumps and is_aim(upper)) for one, upper in marked]
 
 

@@ -3,13 +3,13 @@
 It is the one thing that changes while a program runs; functions of the other files take it and change it, block by block.
 """
 
-import math
 from dataclasses import dataclass, field
 from typing import Final
 
 from twin.programs.canonical import Move, Position, ToolLength
 from twin.programs.cutter_path import CompensatedSection
 from twin.programs.planes import PLANES
+from twin.programs.put_out import PutOut
 from twin.programs.refusal import RefusedError
 from twin.programs.settings import Settings, ToolOffset
 from twin.programs.sinumerik.frames import Frames
@@ -17,7 +17,7 @@ from twin.programs.sinumerik.frames import Frames
 MM_PER_INCH: Final = 25.4
 START: Final = {
     **{"motion": "G1", "plane": "G17", "cutter": "G40", "work": "G500", "path": "G64", "distance": "G90", "feed": "G94"},
-    **{"contour_feed": "CFC", "approach": "NORM", "corner": "G450", "jerk": "BRISK", "feed_forward": "FFWOF", "dialect": "G290"},
+    **{"contour_feed": "CFC", "approach": "NORM", "corner": "G450", "jerk": "SOFT", "feed_forward": "FFWOF", "dialect": "G290"},
 }
 """The G codes in force at the start: those that a control comes with, and continuous path as milling machines are set up."""
 
@@ -67,7 +67,7 @@ class Compensation:
 
 
 @dataclass(slots=True)
-class State:
+class State(PutOut):
     """See the file's docstring. `out` is what moves go to now: `moves`, or the buffer of the cutter compensation.
 
     feed_word: mm/min, mm/rev or 1/min as the feed mode says; tangent: direction in the plane at the end of the last motion
@@ -137,12 +137,6 @@ class State:
         """Return True where a tool with a length was chosen, and none is in the spindle yet: nothing can be cut so."""
         return self.tool == 0 and bool(self.preselected) and bool(self.tool_offsets)
 
-    def emit(self, move: Move) -> None:
-        """Put out what is not a motion."""
-        self.out.append(move)
-        if len(self.out) > self.settings.moves_max:
-            raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
-
     def take_length(self) -> None:
         """Say the tool length before the first move that is told where z goes since it changed: that move contains it."""
         if self.length_is_due:
@@ -166,9 +160,3 @@ class State:
         if self.rpm <= 0.0 or self.spindle_direction == 0:
             raise RefusedError("", "a feed per revolution needs a turning spindle; write S and M3 before")
         return feed_per_rev_mm * self.rpm, feed_per_rev_mm
-
-    def checked(self, position: Position) -> Position:
-        """`position`, if a machine could be there."""
-        if not all(map(math.isfinite, position)) or any(abs(figure) > 1e12 for figure in position):
-            raise RefusedError("", "the end of this move is beyond any machine")
-        return position

@@ -276,3 +276,30 @@ def test_a_cycle_that_cannot_be_run_is_refused(blocks: list[str], word: str, rea
         interpret(program(*BEFORE, *blocks))
     assert caught.value.word == word
     assert reason in caught.value.reason
+
+
+def test_a_fault_of_a_cycle_is_named_where_it_was_defined_and_by_the_number_of_its_block() -> None:
+    text = program(
+        "1 TOOL CALL 1 Z S1000",
+        "2 L Z+50 R0 FMAX M3",
+        "3 CYCL DEF 200 DRILLING ~",
+        "    Q200=2 ~",
+        "    Q201=-5 ~",
+        "    Q206=150 ~",
+        "    Q203=+0 ~",
+        "    Q204=50",
+        "4 L X+10 Y+10 R0 FMAX M99",
+    )
+    with pytest.raises(PartProgramError) as missing:
+        interpret(text)
+    assert str(missing.value) == "block 3 (line 4): CYCL DEF 200: needs Q202"
+    with pytest.raises(PartProgramError) as wrong:
+        interpret(text.replace("Q201=-5 ~", "Q201=+5 ~ \n    Q202=2 ~"))
+    assert (wrong.value.line, wrong.value.block, wrong.value.word) == (6, 3, "Q201")
+
+
+def test_a_fault_in_a_block_with_a_number_is_named_by_it() -> None:
+    with pytest.raises(PartProgramError, match=r"^block 17 \(line 2\): M999"):
+        interpret(program("17 L X+5 R0 FMAX M999"))
+    with pytest.raises(PartProgramError, match=r"^line 2: M999"):
+        interpret(program("L X+5 R0 FMAX M999"))

@@ -11,7 +11,6 @@ from twin.programs.klartext import spindle
 from twin.programs.klartext.cycles import steps
 from twin.programs.klartext.cycles.definition import Definition
 from twin.programs.klartext.state import State
-from twin.programs.refusal import RefusedError
 
 OFF_WALL_MM: Final = 0.2
 DIRECTIONS: Final[Mapping[int, tuple[float, float]]] = {
@@ -52,7 +51,7 @@ def back_boring(state: State, cycle: Definition) -> None:
         return
     away = DIRECTIONS[cycle.number_of(214, 0, 4)]
     if away == (0.0, 0.0):
-        raise RefusedError("Q214", "needs the direction off the wall, 1 to 4")
+        raise cycle.refusal(214, "needs the direction off the wall, 1 to 4")
     shift, direction = cycle.positive(252), state.spindle_direction or 1
     under = cycle.surface_mm() - cycle.length(250, 0.0) - cycle.length(251, 0.0)
     below = under - cycle.length(200, 0.0)

@@ -77,7 +77,9 @@ def evaluated(state: State, number: int, given: Mapping[int, tuple[Expression, s
             raise RefusedError(refused.word, refused.reason, (line, state.program)) from None
         if math.isfinite(values[parameter]):
             state.variables.write("Q", parameter, values[parameter])
-    return Definition(number, values, state.unit_mm, state.feed_unit, state.tool.feed_mm_min)
+    lines = {parameter: line for parameter, (_, _, line) in given.items()}
+    feed = state.tool.feed_mm_min
+    return Definition(number, values, state.unit_mm, state.feed_unit, feed, line=state.line, lines=lines, program=state.program)
 
 
 def refuse(text: str, reason: str) -> None:

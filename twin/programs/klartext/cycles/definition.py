@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from twin.programs.klartext.numbers import VALUE, Expression, value
@@ -32,6 +32,7 @@ class Definition:
 
     values: parameters by number, in program units; a feed of FMAX is infinite, F AUTO a NaN
     name: of cycle 12's program; raised_mm: of CYCL CALL POS, by which the surface lies higher
+    line, lines: of CYCL DEF, and of its parameters by number, in the text of `program`: where a fault is
     """
 
     number: int
@@ -41,6 +42,9 @@ class Definition:
     tool_feed_mm_min: float | None = None
     name: str = ""
     raised_mm: float = 0.0
+    line: int | None = None
+    lines: Mapping[int, int] = field(default_factory=dict)
+    program: str | None = None
 
     @property
     def text(self) -> str:
@@ -50,34 +54,40 @@ class Definition:
         """A parameter as it stands; RefusedError where the definition does not have it and the cycle cannot do without."""
         found = self.values.get(number, OPTIONAL.get(number))
         if found is None:
-            raise RefusedError(self.text, f"needs Q{number}")
+            raise self.refusal(None, f"needs Q{number}")
         return found
+
+    def refusal(self, number: int | None, reason: str) -> RefusedError:
+        """Return the error of a parameter, or of the definition as a whole, where it stands in the text."""
+        line = self.line if number is None else self.lines.get(number, self.line)
+        place = None if line is None else (line, self.program)
+        return RefusedError(self.text if number is None else f"Q{number}", reason, place)
 
     def number_of(self, number: int, low: int, high: int) -> int:
         """A parameter that counts or chooses."""
         found = self.value(number)
         if not math.isfinite(found) or not found.is_integer() or not low <= found <= high:
-            raise RefusedError(f"Q{number}", f"has to be a whole number from {low} to {high} in {self.text}")
+            raise self.refusal(number, f"has to be a whole number from {low} to {high} in {self.text}")
         return int(found)
 
     def length(self, number: int, least: float = -math.inf) -> float:
         """A parameter in mm. RefusedError below `least`."""
         found = self.value(number) * self.unit_mm
         if not math.isfinite(found) or found < least:
-            raise RefusedError(f"Q{number}", f"has to be at least {least:g} in {self.text}")
+            raise self.refusal(number, f"has to be at least {least:g} in {self.text}")
         return found
 
     def positive(self, number: int) -> float:
         """A parameter in mm that is more than 0."""
         found = self.length(number)
         if found <= 0.0:
-            raise RefusedError(f"Q{number}", f"has to be more than 0 in {self.text}")
+            raise self.refusal(number, f"has to be more than 0 in {self.text}")
         return found
 
     def seconds(self, number: int) -> float:
         found = self.value(number)
         if not 0.0 <= found <= SECONDS_MAX:
-            raise RefusedError(f"Q{number}", f"is a time from 0 to {SECONDS_MAX:g} s")
+            raise self.refusal(number, f"is a time from 0 to {SECONDS_MAX:g} s")
         return found
 
     def feed(self, number: int, instead: int | None = None) -> float:
@@ -87,17 +97,17 @@ class Definition:
             return self.feed(instead)
         if math.isnan(found):
             if self.tool_feed_mm_min is None:
-                raise RefusedError(f"Q{number}", "TOOL CALL gave no feed for FAUTO; write F there, or a figure here")
+                raise self.refusal(number, "TOOL CALL gave no feed for FAUTO; write F there, or a figure here")
             return self.tool_feed_mm_min
         if found <= 0.0:
-            raise RefusedError(f"Q{number}", "a feed is more than 0")
+            raise self.refusal(number, "a feed is more than 0")
         return RAPID if found >= RAPID_FROM else found * self.feed_unit
 
     def cutting_feed(self, number: int) -> float:
         """A feed in mm/min that is not rapid."""
         found = self.feed(number)
         if not math.isfinite(found):
-            raise RefusedError(f"Q{number}", "this cut cannot be in rapid; write a feed")
+            raise self.refusal(number, "this cut cannot be in rapid; write a feed")
         return found
 
     def surface_mm(self) -> float:
@@ -108,7 +118,7 @@ class Definition:
         """A depth as a positive figure; 0: the cycle is not run. RefusedError for one that points out of the workpiece."""
         found = self.length(number)
         if found > 0.0:
-            raise RefusedError(f"Q{number}", "the control refuses a depth that is not negative")
+            raise self.refusal(number, "the control refuses a depth that is not negative")
         return -found
 
     def with_values(self, changed: Mapping[int, float]) -> "Definition":

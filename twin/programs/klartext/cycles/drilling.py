@@ -10,7 +10,6 @@ from twin.programs.klartext import spindle
 from twin.programs.klartext.cycles import steps
 from twin.programs.klartext.cycles.definition import Definition
 from twin.programs.klartext.state import State
-from twin.programs.refusal import RefusedError
 
 CHIP_RETRACT_MM_MIN: Final = 3000.0
 """The feed at which a chip is broken (205, Q256)."""
@@ -19,7 +18,7 @@ CHIP_RETRACT_MM_MIN: Final = 3000.0
 def tip_only(cycle: Definition) -> None:
     """The depth counts to the tool's tip; to the full diameter it would need the point angle of the tool table."""
     if cycle.number_of(395, 0, 1) == 1:
-        raise RefusedError("Q395", "needs the point angle of the tool, which is not known; write 0 and a depth to the tip")
+        raise cycle.refusal(395, "needs the point angle of the tool, which is not known; write 0 and a depth to the tip")
 
 
 def drilling(state: State, cycle: Definition) -> None:
@@ -92,7 +91,7 @@ def universal_pecking(state: State, cycle: Definition) -> None:
         return
     feed, back, start = cycle.cutting_feed(206), cycle.feed(208, instead=206), cycle.length(379, 0.0)
     if start >= total:
-        raise RefusedError("Q379", "the starting point lies below the depth Q201")
+        raise cycle.refusal(379, "the starting point lies below the depth Q201")
     first, last = cycle.length(258, 0.0), cycle.length(259, 0.0)
     clearance = steps.begin(state, cycle)
     if start > 0.0:
@@ -127,7 +126,7 @@ def plunge(state: State, cycle: Definition, done_mm: float, depth_mm: float, fee
 def centring(state: State, cycle: Definition) -> None:
     """240: to the depth Q201; to a diameter it would need the point angle of the tool table."""
     if cycle.number_of(343, 0, 1) == 1:
-        raise RefusedError("Q343", "needs the point angle of the tool, which is not known; write 0 and a depth")
+        raise cycle.refusal(343, "needs the point angle of the tool, which is not known; write 0 and a depth")
     total = cycle.depth_mm()
     if total == 0.0:
         return
@@ -142,7 +141,7 @@ def deep_drilling(state: State, cycle: Definition) -> None:
     """241: to the starting point Q379 with Q253 and the speed Q427, on to the depth with Q206 and the speed Q428."""
     tip_only(cycle)
     if cycle.values.get(435, 0.0) != 0.0 or cycle.values.get(202, 0.0) != 0.0:
-        raise RefusedError("Q435" if cycle.values.get(435) else "Q202", f"is not modelled in {cycle.text}; write 0")
+        raise cycle.refusal(435 if cycle.values.get(435) else 202, f"is not modelled in {cycle.text}; write 0")
     total, surface, clear = cycle.depth_mm(), cycle.surface_mm(), cycle.length(200, 0.0)
     if total == 0.0:
         return

@@ -11,7 +11,6 @@ from twin.programs.klartext.cycles.definition import Definition
 from twin.programs.klartext.cycles.shapes import Circle, Rectangle, RoundSlot, Slot, Turn
 from twin.programs.klartext.state import State
 from twin.programs.planar import Piece
-from twin.programs.refusal import RefusedError
 
 
 def bore_milling(state: State, cycle: Definition) -> None:
@@ -24,13 +23,13 @@ def bore_milling(state: State, cycle: Definition) -> None:
     sense = 1.0 if cycle.number_of(351, -1, 1) >= 0 else -1.0
     path = radius - tool
     if path < -steps.ROUNDING_MM:
-        raise RefusedError("Q335", f"the bore, {2.0 * radius:g} mm, is narrower than the tool, {2.0 * tool:g} mm")
+        raise cycle.refusal(335, f"the bore, {2.0 * radius:g} mm, is narrower than the tool, {2.0 * tool:g} mm")
     clearance, centre = steps.begin(state, cycle), steps.in_plane(state)
     bottom = cycle.surface_mm() - total
     if path > steps.ROUNDING_MM:
         turns = (clearance - bottom) / pitch
         if turns > state.settings.pecks_max:
-            raise RefusedError("Q334", f"makes more than {state.settings.pecks_max} turns; Settings.pecks_max")
+            raise cycle.refusal(334, f"makes more than {state.settings.pecks_max} turns; Settings.pecks_max")
         wall = (centre[0] + path, centre[1])
         half = (centre[0] + path / 2.0, centre[1])
         pocketing.put(state, Piece(centre, wall, half, sense * math.pi), feed)
@@ -68,7 +67,7 @@ def slot(state: State, cycle: Definition) -> None:
     """253: Q218 long, Q219 wide, turned by Q374; Q367: the tool is in the middle (0), at an end (1, 4), at its centre (2, 3)."""
     length, width = cycle.positive(218), cycle.positive(219)
     if length < width:
-        raise RefusedError("Q218", "the slot is shorter than it is wide")
+        raise cycle.refusal(218, "the slot is shorter than it is wide")
     half = (length - width) / 2.0
     away = (0.0, length / 2.0, half, -half, -length / 2.0)[cycle.number_of(367, 0, 4)]
     turn = Turn(steps.in_plane(state), math.radians(cycle.value(374)))
@@ -89,9 +88,9 @@ def circular_slot(state: State, cycle: Definition) -> None:
     width, pitch = cycle.positive(219), cycle.positive(375) / 2.0
     begin, opening = math.radians(cycle.value(376)), math.radians(cycle.value(248))
     if not 0.0 < opening < math.tau:
-        raise RefusedError("Q248", "the opening angle is more than 0 and less than 360 degrees")
+        raise cycle.refusal(248, "the opening angle is more than 0 and less than 360 degrees")
     if pitch <= width / 2.0:
-        raise RefusedError("Q375", "the pitch circle is too small for the width Q219")
+        raise cycle.refusal(375, "the pitch circle is too small for the width Q219")
     place, here = cycle.number_of(367, 0, 3), steps.in_plane(state)
     at = (0.0, begin, begin + opening / 2.0, begin + opening)[place]
     centre = (

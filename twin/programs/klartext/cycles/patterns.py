@@ -54,7 +54,7 @@ def grid_pattern(state: State, cycle: Definition) -> None:
     step_a, step_b, turn = cycle.length(237), cycle.length(238), math.radians(cycle.value(224))
     columns, rows = cycle.number_of(242, 1, PLACES_MAX), cycle.number_of(243, 1, PLACES_MAX)
     if columns * rows > PLACES_MAX:
-        raise RefusedError("Q243", f"makes more than {PLACES_MAX} places")
+        raise cycle.refusal(243, f"makes more than {PLACES_MAX} places")
     work(state, cycle, grid(begin, step_a, step_b, columns, rows, turn), None, 1.0)
 
 

@@ -57,7 +57,7 @@ def run(state: State, cycle: Definition, shape: Shape, plunging: int) -> None:
     finishing = cycle.cutting_feed(385) if 385 in cycle.values else feed
     overlap = cycle.value(370)
     if not 0.0 < overlap <= HIGHEST_OVERLAP:
-        raise RefusedError("Q370", f"the path overlap is more than 0 and up to {HIGHEST_OVERLAP:g} tool radii")
+        raise cycle.refusal(370, f"the path overlap is more than 0 and up to {HIGHEST_OVERLAP:g} tool radii")
     side, bottom = cycle.length(368, 0.0), cycle.length(369, 0.0)
     # Clockwise turning tool: inside a pocket climb milling goes counter-clockwise.
     climb = cycle.number_of(351, -1, 1) >= 0

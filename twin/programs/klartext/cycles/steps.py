@@ -88,7 +88,7 @@ def pecks(state: State, cycle: Definition, total_mm: float, first_mm: float, les
     while done < total_mm:
         size = first_mm if less_mm <= 0.0 else max(first_mm - count * less_mm, least_mm)
         if size <= 0.0:
-            raise RefusedError("Q205" if count else "Q202", f"a plunging depth is more than 0 in {cycle.text}")
+            raise cycle.refusal(205 if count else 202, f"a plunging depth is more than 0 in {cycle.text}")
         count += 1
         if count > state.settings.pecks_max:
             raise RefusedError(cycle.text, f"makes more than {state.settings.pecks_max} plunges; Settings.pecks_max")

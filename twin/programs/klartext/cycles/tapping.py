@@ -53,11 +53,11 @@ def thread(state: State, cycle: Definition, every_mm: float, back_mm: float) -> 
     need_speed(state, cycle)
     pitch, surface = abs(cycle.length(239)), cycle.surface_mm()
     if pitch == 0.0:
-        raise RefusedError("Q239", "a thread needs its pitch")
+        raise cycle.refusal(239, "a thread needs its pitch")
     right = 1 if cycle.value(239) > 0.0 else -1
     faster = cycle.value(403)
     if not 0.0 < faster <= 10.0:
-        raise RefusedError("Q403", "the speed of the way out is more than 0 and up to 10 times that of the way in")
+        raise cycle.refusal(403, "the speed of the way out is more than 0 and up to 10 times that of the way in")
     clearance, rpm = steps.begin(state, cycle), state.rpm
     depths = list(steps.pecks(state, cycle, total, every_mm, 0.0, 0.0)) if every_mm > 0.0 else [total]
     for depth in depths:

@@ -8,7 +8,11 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.language.functions import Value, as_number
 
 NEWER: Final = ("_UMODE", "_FS", "_ZFS", "_GMODE", "_DMODE", "_AMODE")
-"""What newer screens put behind the parameters of a milling cycle. _DMODE is for the screen alone."""
+"""What the screens of Operate put behind the parameters of a milling cycle. _DMODE ends in the plane (`in_plane`)."""
+OPERATE: Final = (
+    "is a mode of Operate's screens that is not read; post this operation without the cycle, or call it as older controls do: "
+    "the depth as a coordinate, widths in mm, and 0 here"
+)
 
 
 class Arguments:
@@ -21,7 +25,11 @@ class Arguments:
         while given and given[-1] is None:
             given.pop()
         if len(given) > len(names):
-            raise RefusedError(cycle, f"takes {len(names)} arguments, and the call has {len(given)}")
+            raise RefusedError(
+                cycle,
+                f"takes {len(names)} arguments, and the call has {len(given)}; one that Operate wrote is not read: "
+                "post this operation without the cycle",
+            )
         self.cycle, self.unit_mm = cycle, unit_mm
         self.values = dict(zip(names, given, strict=False))
 
@@ -66,4 +74,18 @@ class Arguments:
         for name in names:
             value = self.values.get(name)
             if value not in (None, 0.0, ""):
-                raise RefusedError(f"{self.cycle} {name}", reason)
+                figure = f"{value:.12g}" if isinstance(value, float) else str(value)
+                raise RefusedError(f"{self.cycle} {name}={figure}", reason)
+
+    def older_form(self, *modes: str) -> None:
+        """RefusedError where one of these modes of Operate's screens is not 0. _FS and _ZFS are for chamfering only."""
+        self.only_zero(*modes, reason=OPERATE)
+
+    def in_plane(self, plane: int) -> None:
+        """RefusedError where the last digit of _DMODE (1, 2, 3: G17, G18, G19) names another plane than that in force."""
+        named = self.whole("_DMODE", 0, 999_999_999) % 10
+        if named > 3 or named not in (0, plane - 16):
+            wanted = f"G{16 + named}" if named <= 3 else "no plane"
+            raise RefusedError(
+                f"{self.cycle} _DMODE", f"its last digit {named} is {wanted}, and G{plane} is in force; write it before"
+            )

@@ -6,7 +6,7 @@ from typing import Final
 
 from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik import compensation
-from twin.programs.sinumerik.cycles import deep_hole, drilling, face, patterns, pocket, slot, tapping
+from twin.programs.sinumerik.cycles import deep_hole, drilling, face, patterns, pocket, slot, spigot, tapping
 from twin.programs.sinumerik.cycles.arguments import NEWER, Arguments
 from twin.programs.sinumerik.language.functions import Value
 from twin.programs.sinumerik.language.syntax import Invocation, Name
@@ -16,6 +16,7 @@ DEPTH: Final = ("RTP", "RFP", "SDIS", "DP", "DPR")
 MODES: Final = ("_GMODE", "_DMODE", "_AMODE")
 PATTERN: Final = ("_VARI", "_UMODE", "_HIDE", "_NSP", "_DMODE")
 PLAIN: Final = ("RTP", "RFP", "SDIS", "DP")
+AROUND: Final = ("_MID", "_FAL", "_FALD", "_FFP1", "_FFD", "_CDIR", "_VARI")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,18 +140,24 @@ CYCLES: Final[Mapping[str, Cycle]] = {
         ),
         face.face,
     ),
+    "CYCLE76": Cycle(
+        (*DEPTH, "_LENG", "_WID", "_CRAD", "_PA", "_PO", "_STA", *AROUND, "_AP1", "_AP2", *NEWER[1:]), spigot.rectangle
+    ),
+    "CYCLE77": Cycle((*DEPTH, "_PRAD", "_PA", "_PO", *AROUND, "_AP1", *NEWER[1:]), spigot.circle),
     "CYCLE832": Cycle(()),
     "CYCLE800": Cycle(SWIVEL, swivel),
 }
 
-CONTOUR_POCKET: Final = "contour milling of the cycle's own is not read; have the CAM system put out the path"
+CONTOUR_POCKET: Final = (
+    "contour milling of the cycle's own is not read; have the CAM system put out the path, or write it with G41 or G42"
+)
 REFUSED_CYCLES: Final[Mapping[str, str]] = {
     **dict.fromkeys(("CYCLE996", "CYCLE9960"), SWIVELS),
     **dict.fromkeys(("CYCLE60", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE72", "CYCLE73", "CYCLE74", "CYCLE75"), CONTOUR_POCKET),
-    **dict.fromkeys(("CYCLE76", "CYCLE77", "CYCLE79"), "spigots are not read; write the contour with G41 or G42"),
+    "CYCLE79": "polygons are not read; write the contour with G41 or G42",
     **dict.fromkeys(("CYCLE70", "CYCLE90"), "thread milling is not read; write the helix with TURN="),
     **dict.fromkeys(("POCKET1", "POCKET2"), "is not read; write POCKET3 or POCKET4"),
-    "CYCLE61": "its modes say what its corner and its depth mean, and are not published in full; write CYCLE71, or the path",
+    "CYCLE61": "its modes say what corner and depth mean, and are not read; write CYCLE71, or post the face without a cycle",
     "CYCLE78": "drilling and thread milling in one is not read",
     "CYCLE899": "open slots are not read",
     **dict.fromkeys((f"CYCLE9{one}" for one in (2, 3, 4, 5, 6, 7, 8, 9)), "is a cycle of a lathe"),
@@ -166,6 +173,8 @@ def run_cycle(state: State, called: Name | Invocation, given: list[Value | None]
         raise RefusedError(called.text, "cannot stand between the two blocks of a corner or an angle")
     names = cycle.parameters
     arguments = Arguments(called.name, names, given, state.unit_mm)
+    if arguments.has("_DMODE"):
+        arguments.in_plane(state.plane)
     if arguments.has("_AXN") and arguments.number("_AXN") not in (0.0, 1.0 + state.normal):
         raise RefusedError(
             f"{called.name} _AXN", f"the twin drills along the normal of G{state.plane} only, axis {1 + state.normal}"

@@ -108,12 +108,15 @@ def steps(state: State, given: Arguments, top: float, bottom: float, most: float
     yield bottom
 
 
-def turns_left(state: State, given: Arguments, name: str = "_CDIR") -> bool:
-    """Return True where the cutter goes counter-clockwise round the inside: 0 climb, 1 up-cut by the spindle, 2 G2, 3 G3."""
+def turns_left(state: State, given: Arguments, name: str = "_CDIR", *, outside: bool = False) -> bool:
+    """Return True where the cutter goes round counter-clockwise: 0 climb, 1 up-cut by the spindle, 2 G2, 3 G3.
+
+    outside: round a spigot, where climb is the other way than in a pocket
+    """
     code = given.whole(name, 0, 3)
     if code >= 2:
         return code == 3
-    return (code == 0) == (state.spindle_direction >= 0)
+    return ((code == 0) == (state.spindle_direction >= 0)) != outside
 
 
 def rings(state: State, given: Arguments, radius: float, room: float, has_corners: bool) -> int:

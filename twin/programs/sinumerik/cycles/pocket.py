@@ -88,7 +88,7 @@ def circle(state: State, given: Arguments) -> None:
 
 def common(state: State, given: Arguments) -> Levels:
     given.only_zero("_AP1", "_AP2", "_AD", reason="a pocket that is partly milled already is not read")
-    given.only_zero("_UMODE", "_FS", "_ZFS", "_GMODE", "_AMODE", reason="the modes of the newer screens are not read; only 0 is")
+    given.older_form("_UMODE", "_GMODE", "_AMODE")
     if state.spindle_direction == 0:
         raise RefusedError(given.cycle, "needs a turning spindle; write S and M3 before")
     return levels(state, given)

@@ -73,7 +73,7 @@ def distance(shape: Shape, point: Point) -> float:
 def spinning(state: State, given: Arguments) -> None:
     if state.spindle_direction == 0:
         raise RefusedError(given.cycle, "needs a turning spindle; write S and M3 before")
-    given.only_zero("_GMODE", "_AMODE", "_UMODE", "_FS", "_ZFS", reason="the modes of the newer screens are not read; only 0 is")
+    given.older_form("_UMODE", "_GMODE", "_AMODE")
 
 
 def along_radius(state: State, given: Arguments) -> None:

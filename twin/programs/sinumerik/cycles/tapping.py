@@ -12,8 +12,9 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik import motion
 from twin.programs.sinumerik.cycles.arguments import Arguments
 from twin.programs.sinumerik.cycles.levels import Levels, levels, pause, to
-from twin.programs.sinumerik.spindle import DIRECTIONS, RPM_MAX, orient, turn
+from twin.programs.sinumerik.spindle import DIRECTIONS, orient, turn
 from twin.programs.sinumerik.state import State
+from twin.programs.spindle_speed import RPM_MAX
 
 METRIC: Final[Mapping[int, float]] = {
     **{3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5, 24: 3.0, 27: 3.0},
