@@ -10,11 +10,12 @@ from sparkplug.quality import QUALITY_PROPERTY, REASON_PROPERTY, Quality
 from sparkplug.topics import NodeId
 from sparkplug.values import MetaData, PropertySet, PropertyValue, Value
 
-__all__ = ["Change", "MetricSpec", "NodeId", "Reading", "quality_properties"]
+__all__ = ["Change", "MetricSpec", "NodeId", "Reading", "is_command_metric", "quality_properties"]
 
 UNIT_PROPERTY = "engUnit"
 LOW_PROPERTY = "engLow"
 HIGH_PROPERTY = "engHigh"
+COMMAND_PREFIXES = ("Node Control/", "Device Control/")
 _PROPERTY_TYPES = ((bool, DataType.BOOLEAN), (int, DataType.INT64), (float, DataType.DOUBLE), (str, DataType.STRING))
 
 
@@ -81,6 +82,15 @@ class Reading(NamedTuple):
     unit: str | None
     reason: str | None
     is_historical: bool
+
+
+def is_command_metric(name: str) -> bool:
+    """Return True for a metric by which hosts command a node or a device; it measures nothing.
+
+    >>> is_command_metric("Device Control/Receipt"), is_command_metric("spindle_rpm")
+    (True, False)
+    """
+    return name.startswith(COMMAND_PREFIXES)
 
 
 def _property(value: str | float | int | bool) -> PropertyValue:

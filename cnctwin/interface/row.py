@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from sparkplug.host_event import EventKind, HostEvent
-from sparkplug.metric import NodeId, Reading
+from sparkplug.metric import NodeId, Reading, is_command_metric
 from sparkplug.values import Value
 from twin.vocabulary.nodes import JOBS_NODE
 
@@ -61,7 +61,7 @@ class Rows:
         """The row after an event; None where it says nothing new of this machine."""
         if event.device != self._machine or event.node.node == JOBS_NODE or event.kind not in _KINDS:
             return None
-        readings = (one for one in event.read() if not one.is_historical and not one.name.startswith(_CONTROL))
+        readings = (one for one in event.read() if not one.is_historical and not is_command_metric(one.name))
         new = {reading.name: _signal(reading) for reading in readings}
         if not new:
             return None
@@ -73,8 +73,6 @@ class Rows:
         return Row(self._machine, max(one.t for one in new.values()), MappingProxyType(signals), tuple(new))
 
 
-_CONTROL = "Device Control/"
-"""Of metrics that are written to, by which hosts command a device; they are no signals."""
 _KINDS = frozenset({EventKind.BIRTH, EventKind.DATA, EventKind.DEATH})
 
 

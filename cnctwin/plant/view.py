@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from sparkplug.metric import NodeId, Reading
+from sparkplug.metric import NodeId, Reading, is_command_metric
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
 from sparkplug.values import Value
@@ -65,6 +65,8 @@ def machines(pictures: Pictures) -> list[MachineView]:
             continue  # a job is no machine, nor is each machine that a job is about one of the plant
         for device, owner in picture.devices.items():
             for name, reading in owner.readings.items():
+                if is_command_metric(name):
+                    continue
                 side = twin if name.startswith(TWIN_PREFIX) else measured
                 side.setdefault(device, {})[name] = reading
                 if side is measured:

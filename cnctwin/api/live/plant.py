@@ -19,7 +19,7 @@ from cnctwin.api.live.stamp import STAMP_MS_MAX, is_time, without_time
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import plain, value_object
 from sparkplug.host_session import EventKind, HostEvent
-from sparkplug.metric import NodeId, Reading
+from sparkplug.metric import NodeId, Reading, is_command_metric
 from sparkplug.quality import Quality
 from sparkplug.values import DataSet, PropertySet, Template
 from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
@@ -235,6 +235,8 @@ class LivePlant:
         before, owner.online = owner.clashing | owner.signals, True
         owner.signals, owner.clashing = {}, {}
         for told in event.readings:
+            if event.device is not None and is_command_metric(told.name):
+                continue
             reading = self._timed(told, event, now_ms)
             if len(owner.signals) >= SIGNALS_MAX:
                 self.counts["signals_over_limit"] += 1

@@ -15,7 +15,7 @@ from tests.cnctwin.plant.pictures import Pictures, balance, owner
 
 def plant() -> Pictures:
     stale = Reading("spindle_rpm", 3000.0, 1_000, Quality.STALE, "rev/min", None, False)
-    machine = {"exec_state": "ACTIVE", "tool_change_active": True, "a_signal_of_its_own": 1}
+    machine = {"exec_state": "ACTIVE", "tool_change_active": True, "a_signal_of_its_own": 1, "Device Control/Receipt": None}
     return (
         Pictures()
         .add("twin-thermal", owner(balance(9, 9)), {"vmc": owner({"twin/spindle_temp_c": 24.5})})
@@ -30,7 +30,7 @@ def shown(what: Any) -> str:
     return str(console.file.getvalue())  # type: ignore[attr-defined]
 
 
-def test_measured_and_modelled_values_of_a_machine_stand_together() -> None:
+def test_measured_and_modelled_values_of_a_machine_stand_together_without_what_it_is_commanded_by() -> None:
     lathe, vmc = machines(plant())
     assert (vmc.name, vmc.online) == ("vmc", True)
     assert set(vmc.measured) == {"exec_state", "tool_change_active", "a_signal_of_its_own"}

@@ -20,6 +20,15 @@ def told(live: LivePlant, machine: str, signal: str) -> dict[str, object]:
     return found
 
 
+def test_a_metric_by_which_a_machine_is_commanded_is_no_signal_of_it() -> None:
+    live, t_ms = small_plant(), now()
+    live.take([birth({LOAD: 1.0, "Device Control/Receipt": ""}, t_ms)], t_ms)
+    live.take([data({LOAD: 2.0, "Device Control/Receipt": "7"}, t_ms + 1)], t_ms + 1)
+    state = live.state("vmc", now())
+    assert state is not None
+    assert set(state["measured"]) == {LOAD}
+
+
 @pytest.mark.parametrize("stamp_ms", STAMPS)
 @pytest.mark.parametrize("is_watched", [False, True])
 def test_a_stamp_that_is_no_time_keeps_its_reading_out_and_no_other(stamp_ms: int, is_watched: bool) -> None:
