@@ -7,6 +7,9 @@ from sparkplug.admission.refusal import Refusal
 from sparkplug.layouts.layout import Packed
 from sparkplug.metric import NodeId, Reading
 
+NODE_OFFLINE = "edge node offline"
+"""The detail of a death that came with that of its edge node: it was killed, stopped or cut off."""
+
 
 class EventKind(Enum):
     """The kind of an event."""

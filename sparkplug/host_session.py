@@ -16,7 +16,7 @@ from sparkplug.admission.rates import Overrun
 from sparkplug.admission.refusal import Refusal
 from sparkplug.codec import parse
 from sparkplug.errors import PayloadError, TopicError
-from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.host_event import NODE_OFFLINE, EventKind, HostEvent
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
 from sparkplug.metric import Change, NodeId
@@ -278,7 +278,7 @@ class HostSession:
             return []
         events = self._deliver(watched, watched.window.flush(), now_ms)
         self._requests.born(picture.node)  # a dead node has no birth to give
-        return events + self._wither(watched, now_ms, "edge node offline")
+        return events + self._wither(watched, now_ms, NODE_OFFLINE)
 
     def _wither(self, watched: Watched, now_ms: int, reason: str) -> list[HostEvent]:
         """The node and all its devices go offline by the host's clock."""

@@ -9,7 +9,7 @@ from typing import Literal
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading, is_command_metric
 from sparkplug.values import Value
-from twin.vocabulary.nodes import JOBS_NODE
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
 
 _EPOCH = datetime.fromtimestamp(0, UTC)
 
@@ -51,7 +51,11 @@ class Row:
 
 
 class Rows:
-    """What is known of one machine; each message of it makes a row. Older values that a sender delivers late make none."""
+    """What is known of one machine; each message of it makes a row, from the birth of its own edge on.
+
+    Before that only its twin may have been heard, and a row would lack what the control reports. Older values that a sender
+    delivers late make none.
+    """
 
     def __init__(self, machine: str) -> None:
         self._machine = machine
@@ -69,6 +73,8 @@ class Rows:
             self._told[event.node] = new
         else:
             self._told.setdefault(event.node, {}).update(new)
+        if all(is_twin_node(node.node) for node in self._told):
+            return None
         signals = {name: signal for told in self._told.values() for name, signal in told.items()}
         return Row(self._machine, max(one.t for one in new.values()), MappingProxyType(signals), tuple(new))
 

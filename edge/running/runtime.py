@@ -310,7 +310,8 @@ class EdgeRuntime:
         """The birth, as soon as there is something to say and the control reports."""
         if self._is_declared or not self._is_reporting or not self._offers or not self._told:
             return
-        known = device_metrics((*self._offers, *self._sensor.offers()), self._told)
+        now_ms = round(self._wall_s() * 1000)
+        known = device_metrics((*self._offers, *self._sensor.offers()), self._told, now_ms)
         metrics = [*known, *self._sensor.metrics(), *self._store.metrics()]
         self._store.declare(metric.name for metric in metrics)
         self._node.declare_device(self.config.machine.name, metrics)

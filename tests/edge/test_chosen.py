@@ -23,7 +23,7 @@ deadband = 0.5
 
 def test_the_birth_declares_them_with_their_unit_and_a_flag_as_a_boolean() -> None:
     config = parse(HEAD + TABLES, Path("edge.toml"))
-    specs = {spec.name: spec for spec in device_metrics([one.offer("there") for one in config.chosen], {})}
+    specs = {spec.name: spec for spec in device_metrics([one.offer("there") for one in config.chosen], {}, 0)}
     assert [(specs[name].datatype, specs[name].unit) for name in ("variable_part_width", "plc_pressure", "plc_door_open")] == [
         (DataType.DOUBLE, "mm"),
         (DataType.DOUBLE, "bar"),

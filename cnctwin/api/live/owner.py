@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 from cnctwin.api.fleet import is_key_signal
 from cnctwin.api.live.trace import Trace
+from sparkplug.host_event import NODE_OFFLINE
 from sparkplug.metric import Reading
+from twin.vocabulary.nodes import TWIN_NODE_PREFIX, is_twin_node
 
 
 class Signal:
@@ -31,6 +33,17 @@ class Owner:
     is_control: bool = False  # it tells measured values, not only the twin's
     signals: dict[str, Signal] = field(default_factory=dict)
     clashing: dict[str, Signal] = field(default_factory=dict)  # that another node of the machine tells already
+
+
+def offline_reason(node: str, reason: str | None) -> str | None:
+    """Return why values of a node are stale: that of a processor names the processor, so that nobody looks at the edge.
+
+    >>> offline_reason("twin-cutting_force", "edge node offline"), offline_reason("edge-vmc", "edge node offline")
+    ('the processor cutting_force is offline', 'edge node offline')
+    """
+    if reason == NODE_OFFLINE and is_twin_node(node):
+        return f"the processor {node.removeprefix(TWIN_NODE_PREFIX)} is offline"
+    return reason
 
 
 def share(owners: Iterable[Owner]) -> None:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from cnctwin.api.fleet import fleet_item
 from cnctwin.api.live.batches import Batch, Row, Waiting, alerts_batch, fleet_rows, machine_rows, notices_batch, state_batch
 from cnctwin.api.live.notices import Notices, notices_of
-from cnctwin.api.live.owner import Owner, Signal, share
+from cnctwin.api.live.owner import Owner, Signal, offline_reason, share
 from cnctwin.api.live.stamp import STAMP_MS_MAX, is_time, without_time
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import plain, value_object
@@ -301,7 +301,7 @@ class LivePlant:
             if signal is not None:
                 if owner.online:
                     signal.live_ms = signal.reading.timestamp_ms
-                signal.reading = reading
+                signal.reading = reading._replace(reason=offline_reason(event.node.node, reading.reason))
                 if event.device is not None:
                     self._keep(signal)
         owner.online = False

@@ -10,10 +10,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
-from cnctwin.memory.replay.log import NODE_OFFLINE, Mark, birth_behind, is_twin
+from cnctwin.memory.replay.log import Mark, birth_behind, is_twin
 from cnctwin.memory.store.contract import Series, Store
 from processors.description import Role
 from processors.discovery import AnyProcessor
+from sparkplug.host_event import NODE_OFFLINE
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from twin.vocabulary.nodes import HISTORIAN_NODE, is_twin_node

@@ -9,8 +9,6 @@ from cnctwin.memory.store.contract import Message, Store
 from sparkplug.host_session import EventKind, HostEvent
 from twin.vocabulary.nodes import is_twin_node
 
-NODE_OFFLINE = "edge node offline"
-"""The detail of a device's death that came with its edge node's: of a processor that was killed, stopped or cut off."""
 NOTHING_YET = (
     "nothing computed yet"  # of processors/running/emission.py: such a value is stamped by the birth that began the twin device
 )

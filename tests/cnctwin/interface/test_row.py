@@ -30,6 +30,13 @@ def test_a_row_holds_what_the_control_and_its_twin_said_last() -> None:
     assert (row["exec_state"].quality, row["exec_state"].reason, row["exec_state"].unit) == ("bad", "gone", "%")
 
 
+def test_a_twin_that_is_heard_before_the_edge_makes_no_row() -> None:
+    rows = Rows("vmc")
+    assert rows.after(told(EventKind.BIRTH, reading("twin/cutting_force_n", 80.0), node=TWIN)) is None
+    row = rows.after(told(EventKind.BIRTH, reading("spindle_load_pct", 3.0)))
+    assert row is not None and set(row.signals) == {"spindle_load_pct", "twin/cutting_force_n"}
+
+
 def test_a_death_makes_a_row_whose_values_are_stale() -> None:
     rows = Rows("vmc")
     rows.after(told(EventKind.BIRTH, reading("spindle_load_pct", 3.0)))

@@ -32,7 +32,7 @@ def test_raw_blocks_reach_the_processor_which_finds_what_the_edge_found(mosquitt
         sensor = Accelerometer(AccelerometerSection(url=sender.url, publish=Publish.BOTH))
         node.start()
         host.start()
-        node.declare_device("vmc", [*device_metrics(sensor.offers(), {}), *sensor.metrics()])
+        node.declare_device("vmc", [*device_metrics(sensor.offers(), {}, 0), *sensor.metrics()])
         deadline_s = time.monotonic() + 60.0
         is_started = False
         try:

@@ -99,3 +99,13 @@ def test_who_takes_the_name_of_a_machine_changes_none_of_its_values_until_its_ow
     assert told(live, "vmc", LOAD)["quality"] == "good"
     live.take([birth({LOAD: 4.0}, t_ms + 3, HOSTILE, "vmc"), death({LOAD: 55.0}, t_ms + 4)], t_ms + 4)
     assert told(live, "vmc", LOAD)["value"] == 4.0
+
+
+def test_values_of_a_processor_that_is_gone_name_it_and_not_the_edge() -> None:
+    live, t_ms = small_plant(), now()
+    twin = NodeId("cnc", "twin-cutting_force")
+    live.take([birth({LOAD: 1.0}, t_ms), birth({"twin/cutting_force_n": 80.0}, t_ms, twin)], t_ms)
+    live.take([death({"twin/cutting_force_n": 80.0}, t_ms + 1, twin)], t_ms + 1)
+    state = live.state("vmc", now())
+    assert state is not None and state["online"]
+    assert state["twin"]["twin/cutting_force_n"]["reason"] == "the processor cutting_force is offline"
