@@ -39,7 +39,7 @@ SHALLOW = 0.02
 """Down to this slope, 1.1°, a ramp is taken for a level cut: its end face takes a fiftieth of the feed."""
 DIGITS, HEADING_STEPS = 6, 24
 SAME_RATIO = 1e-9
-NEAR = "it feeds close to the work without cutting: an approach"
+NEAR = "it feeds close to the work, or down beside it, without cutting: an approach"
 AT_CONTOUR = "its feed at the tool's centre is not the F word: the control keeps F at the contour"
 SPRING = "it runs along the work and cuts nothing by its plan: a spring pass"
 
@@ -341,12 +341,14 @@ def _check_branches(source: list[str], words: SourceWords, run: set[int]) -> Non
 def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[tuple[int, Tool]], tool: int) -> bool:
     """Return True where a feed in air stays clear of the stock as it was: above it, or beside it by more than tool and clearance.
 
-    What is left of the stock would be more exact, and a spring pass along a finished wall is air to it.
+    Beside it a feed that goes down is not clear: clamps and vice are not described. What is left of the stock would be more
+    exact, and a spring pass along a finished wall is air to it.
     """
     stock = machine.stock
     if stock is None or tool < 0:
         return False
-    ends = np.stack(path.tip_ends_mm(segments))
+    start, end = path.tip_ends_mm(segments)
+    ends = np.stack((start, end))
     bulge = np.where(
         path.sweep_rad[segments] != 0.0, path.length_mm[segments], 0.0
     )  # an arc stays within its own length of its ends
@@ -354,6 +356,8 @@ def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[
     reach = tools[tool][1].diameter_mm / 2.0 + CLEARANCE_MM + bulge
     if (low[:, 2] >= stock.max_mm[2] + CLEARANCE_MM).all():
         return True
+    if (start[:, 2] - end[:, 2] > SHALLOW * path.length_mm[segments]).any():
+        return False
     beside = [(low[:, k] - reach >= stock.max_mm[k]) | (high[:, k] + reach <= stock.min_mm[k]) for k in (0, 1)]
     return bool((beside[0] | beside[1]).all())
 

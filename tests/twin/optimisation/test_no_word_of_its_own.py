@@ -5,7 +5,7 @@ import pytest
 from tests.twin.optimisation.test_languages import MACHINE, TOOLS
 from twin.optimisation.answer import Optimised
 from twin.optimisation.optimise import optimise
-from twin.optimisation.program import AT_CONTOUR
+from twin.optimisation.program import AT_CONTOUR, NEAR
 from twin.optimisation.question import Question
 from twin.programs.source import source_lines
 
@@ -58,8 +58,10 @@ def test_a_call_gets_no_word(between: str) -> None:
     assert cut.after.spindle_rpm != 5000.0
 
 
-APPROACH = KLARTEXT.replace("4 L X+25 Y+30 RL F600 M109", "4 L Z-1 R0 F500\n5 APPR LT X+25 Y+30 LEN10 RL F600").replace(
-    "X0 Y20", "X-60 Y-40"
+APPROACH = (
+    KLARTEXT.replace("4 L X+25 Y+30 RL F600 M109", "4 L X-50 Y-40 R0 F500\n5 APPR LT X+25 Y+30 LEN10 RL F600")
+    .replace("X0 Y20", "X-60 Y-40")
+    .replace("3 L Z0", "3 L Z-1")
 )
 
 
@@ -69,8 +71,8 @@ def test_a_line_that_runs_at_what_another_leaves_has_that_one_left_alone_too() -
     why = {one.line: one.left_alone for one in found.lines}
     assert "feed does not follow" in why[5]
     assert why[4].startswith("line 6 behind it is left alone")
-    assert [written for written in source_lines(found.program) if "APPR" in written or "Z-1" in written] == [
-        "4 L Z-1 R0 F500",
+    assert [written for written in source_lines(found.program) if "APPR" in written or "X-50" in written] == [
+        "4 L X-50 Y-40 R0 F500",
         "5 APPR LT X+25 Y+30 LEN10 RL F600",
     ]
     assert any("line 5 (line 6 behind it" in note for note in found.notes)
@@ -84,3 +86,14 @@ def test_holes_of_a_modal_cycle_get_no_words_that_are_in_force_already() -> None
     written = source_lines(answer(HOLES, "a.mpf").program)
     assert written[-6:] == source_lines(HOLES)[-6:]
     assert written[7] != "G1 X130 F600"
+
+
+DOWN = "G17 G90 G21\nT1 M6\nS5000 M3\nG0 X-60. Y20. Z60.\nG1 Z{} F400.\nX130. F600.\nG0 Z60.\nM30\n"
+
+
+@pytest.mark.parametrize(("depth", "is_left"), [("-1.", True), ("50.", False)], ids=["beside the stock", "above it"])
+def test_a_feed_down_beside_the_stock_keeps_its_f_word_since_clamps_are_not_described(depth: str, is_left: bool) -> None:
+    found = answer(DOWN.format(depth), "a.nc", force_limit_n=60.0)
+    line = next(one for one in found.lines if one.line == 4)
+    assert (line.left_alone == NEAR) is is_left
+    assert (line.after.feed_mm_min == 400.0) is is_left
