@@ -46,7 +46,8 @@ def test_a_machine_is_offline_since_the_newest_moment_at_which_it_was_heard(visi
       tell();
       lathe.state({ measured: { spindle_load_pct: stale(2000) }, twin: {}, online: false, now: 9000 });
       tell();
-      lathe.backfill({ signal: 'spindle_load_pct', t: [500, 3000, 4000], value: [30, 40, null], quality: ['good', 'good', 'stale'] });
+      const quality = ['good', 'good', 'stale'];
+      lathe.backfill({ signal: 'spindle_load_pct', t: [500, 3000, 4000], value: [30, 40, null], quality });
       tell();
       lathe.backfill({ signal: 'twin/raw_score', t: [5000], value: [1], quality: ['good'] });
       tell();
@@ -64,7 +65,8 @@ def test_the_alarm_of_the_control_and_the_alert_of_a_moment_are_two_figures(visi
         await Promise.all([module('plant'), module('past'), module('views/moment_shown')]);
       const now = Date.now(), known = new Machine('lathe');
       known.state({ measured: { alarm: { value: '', t: now, quality: 'good' } }, twin: {}, online: true, now });
-      const of = (signal, ...value) => ({ signal, unit: null, t: [now - 60000, now - 30000], value, quality: [], reason: [null, null] });
+      const t = [now - 60000, now - 30000];
+      const of = (signal, ...value) => ({ signal, unit: null, t, value, quality: [], reason: [null, null] });
       const past = livedThrough(known, [of('alarm', 'EX1012', ''), of('twin/alert_state', 'none', 'firing')]);
       const moment = new MomentShown();
       return [now - 50000, now - 20000].map((t) => {
