@@ -50,6 +50,8 @@ def events_of(samples: Mapping[str, Sequence[Sample]]) -> list[Event]:
             events += _stretches(kind, held, lambda value, text=text: text if value is True else "")
         elif signal == twin_signals.PART_RECORD:
             events += _parts(held)
+        elif signal == twin_signals.CONTROL_ALARM and "alarm" in samples:
+            continue  # the control's own text is told already
         elif signal == "tool_number":
             if "tool_change_active" not in samples:
                 events += [_event(one, "tool_change", f"tool {one.value}") for one in _changes(held) if one.value is not None]

@@ -103,11 +103,16 @@ def run(options: DemoOptions, stop: Event) -> int:
         started_s = time.monotonic()
         ends_s = None if options.seconds is None else started_s + options.seconds
 
-        told: set[str] = set()
+        told = {"", demo.page_url}
 
         def over() -> bool:
             demo.watch()
-            if not console.is_terminal and (notice := demo.notice) not in told | {""}:
+            if demo.page_url not in told:  # it came up late
+                told.add(demo.page_url)
+                console.print(page_line(demo), markup=False, highlight=False, soft_wrap=True)
+                if not options.no_open:
+                    open_browser(demo.page_url)
+            if not console.is_terminal and (notice := demo.notice) not in told:
                 told.add(notice)
                 console.print(f"{demo.machine}: {notice}", markup=False, highlight=False, soft_wrap=True)
             return stop.is_set() or (ends_s is not None and time.monotonic() >= ends_s)
@@ -143,12 +148,17 @@ def greeting(demo: Demo) -> str:
         what = f"simulated {pace}; it runs {description.PROGRAM.name}, one part after the other"
     return (
         f"{demo.machine}: {what}\n"
-        f"page:      {demo.page_url or demo.page_trouble}\n"
+        f"{page_line(demo)}\n"
         f"broker:    {demo.broker.address.url} (private, loopback only)\n"
         f"read it:   mosquitto_sub{at} -t '{MIRROR}#' -v          plain JSON, any MQTT client\n"
         f"           mosquitto_sub{at} -t '{NAMESPACE}/#' -F '%t'  the Sparkplug B messages behind it\n"
         f"elsewhere: cnctwin watch --broker {demo.broker.address.url}   cnctwin doctor --broker {demo.broker.address.url}"
     )
+
+
+def page_line(demo: Demo) -> str:
+    """Return the line that says where the page is, or why there is none."""
+    return f"page:      {demo.page_url or demo.page_trouble}"
 
 
 def open_browser(url: str) -> None:

@@ -103,6 +103,7 @@ class Demo:
         self.sealed = folder / "sealed.json"
         self._agent_state, self._page_state = folder / "agent.json", folder / "page.json"
         self.page_url = self.page_trouble = ""
+        self._page: Child | None = None
         self.children: list[Child] = []
 
     def start(self) -> None:
@@ -137,10 +138,11 @@ class Demo:
         self._begin("edge", ["edge", "run", str(edge)])
 
     def watch(self) -> None:
-        """Start again what has died."""
+        """Start again what has died, and take up the address of a page that comes late."""
         self.broker.watch()
         for child in self.children:
             child.watch()
+        self._find_page()
 
     def stop_source(self) -> None:
         """Stop the machine, so that what is on its way can arrive."""
@@ -239,19 +241,24 @@ class Demo:
         """Start the page, on the usual port or a free one, and wait until it says where it is. Without it, the demo goes on."""
         given = ["serve", *arguments, "--state-file", str(self._page_state), "--no-open", "--port"]
         self._begin("page", [*given, str(PAGE_PORT if is_free(PAGE_PORT) else 0)])
-        page = self.children[-1]
-        command = page.command[:-1]
+        page = self._page = self.children[-1]
         deadline_s = time.monotonic() + START_S_MAX
         while time.monotonic() < deadline_s and not self.page_url:
             if not page.running and page.command[-1] != "0":  # somebody else has taken the port meanwhile
-                page.command = [*command, "0"]
+                page.command = [*page.command[:-1], "0"]
                 page.start()
-            self.page_url = str(state_file.read(self._page_state).get("url", ""))
+            self._find_page()
             time.sleep(0.05)
+        if not self.page_url:
+            self.page_trouble = page_trouble(page)
+
+    def _find_page(self) -> None:
+        """Take up where the page is, once it says so."""
+        if self.page_url or self._page is None:
+            return
+        self.page_url = str(state_file.read(self._page_state).get("url", ""))
         if self.page_url:  # killed and started again, it has to be where the browser looks for it
-            page.command = [*command, str(urlsplit(self.page_url).port)]
-        else:
-            self.page_trouble = f"does not start: {page.last_words()}"
+            self._page.command = [*self._page.command[:-1], str(urlsplit(self.page_url).port)]
 
     def _agent_url(self) -> str:
         deadline_s = time.monotonic() + START_S_MAX
@@ -273,6 +280,15 @@ class Demo:
             f"session_file = {json.dumps(str(self._folder / 'edge-session.json'))}\n\n"
             f"[mtconnect]\nurl = {json.dumps(agent_url)}\ndevice = {json.dumps(str(self._state().get('device', '')))}\n"
         )
+
+
+def page_trouble(page: Child) -> str:
+    """Return why there is no page yet, and where it will be, as far as that is known."""
+    if not page.running:
+        return f"does not start: {page.last_words() or 'it ended without a word'}; it is started again"
+    port = page.command[-1]
+    where = "its address is printed here once it is up" if port == "0" else f"it will be at http://127.0.0.1:{port}"
+    return f"not up after {START_S_MAX:g} s; {where}"
 
 
 def machine_name(devices: Path | None) -> str:

@@ -116,10 +116,11 @@ def _made(parts: Sequence[PartTold]) -> Row:
 
 
 def _machine(machine: str, rows: Sequence[Row], asked: Asked) -> Row:
-    """Return the sums of a machine over its shifts; over what is outside all shifts only where it has none."""
+    """Return the sums of a machine over its shifts; over what is outside all shifts only where it has none, or as `beside_s`."""
+    beside_s = sum(row["beside_s"] for row in rows)
     rows = [row for row in rows if row["planned_s"] > 0.0] or rows
     head: Row = {"machine": machine, "shifts": len(rows), "begin": rows[0]["begin"], "end": max(row["end"] for row in rows)}
-    head |= {name: sum(row[name] for row in rows) for name in _SUMMED}
+    head |= {name: sum(row[name] for row in rows) for name in _SUMMED} | {"beside_s": beside_s}
     metered = [row["energy_kwh"] for row in rows if row["energy_kwh"] is not None]
     stops: dict[str, dict[str, Any]] = {}
     for row in rows:

@@ -22,7 +22,7 @@ STATES = frozenset(
     {ACTIVE, READY, "INTERRUPTED", "FEED_HOLD", "STOPPED", "OPTIONAL_STOP", "PROGRAM_STOPPED", COMPLETED, WAIT, OFFLINE}
 )
 BY_CONTROL, BY_FEED = "told by the control", "taken from the feed: the control tells no execution state"
-NOT_TOLD, NO_STOP = "not told", "none"
+NOT_TOLD, NO_STOP, TOOL_CHANGE = "not told", "none", "tool change"
 _BY_STATE = {
     "PROGRAM_STOPPED": "program stop (M0)",
     "OPTIONAL_STOP": "optional stop (M1)",
@@ -106,18 +106,20 @@ def is_held_by_override(sample: Sample) -> bool:
 def stop_reason(state: str, sample: Sample) -> str:
     """Why the machine does not work, from what is told now; NOT_TOLD where nothing is.
 
-    An alarm goes before all else; then what the program or the operator commanded; then what can be seen.
+    An alarm goes before all else; then what the program or the operator commanded; then what can be seen. A WARNING explains
+    a stop only where nothing else does.
     """
     row = sample.row
     if state == OFFLINE:
         return "offline"
+    reason = _BY_STATE.get(state)
+    if is_changing_tool(row) and (reason is None or state == WAIT):
+        reason = TOOL_CHANGE
     alarm = text(row, ALARM)
-    if alarm and state != ACTIVE and (alarm.startswith("FAULT") or state not in _BY_STATE):
+    if alarm and state != ACTIVE and (alarm.startswith("FAULT") or not _explains_more(reason, alarm)):
         return f"alarm: {alarm}"
-    if state in _BY_STATE:
-        return _BY_STATE[state]
-    if is_changing_tool(row):
-        return "tool change"
+    if reason is not None:
+        return reason
     if is_held_by_override(sample):
         return "feed override 0 %"
     if state == COMPLETED:
@@ -126,3 +128,8 @@ def stop_reason(state: str, sample: Sample) -> str:
     if mode is not None and mode not in ("AUTOMATIC", "SEMI_AUTOMATIC"):
         return f"mode {mode}"
     return NOT_TOLD
+
+
+def _explains_more(reason: str | None, alarm: str) -> bool:
+    """Return True if a reason explains a stop better than an alarm that is no fault; a warning does not stop a tool change."""
+    return reason is not None and (reason != TOOL_CHANGE or alarm.startswith("WARNING"))

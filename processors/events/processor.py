@@ -35,11 +35,12 @@ from processors.events.execution import (
     Execution,
     execution,
     is_held_by_override,
+    stop_reason,
     text,
 )
 from processors.events.record import INPUTS as RECORD_INPUTS
 from processors.events.record import record
-from processors.events.run import FORCE, VIBRATION, Run, begun, followed, lasted, why_standing
+from processors.events.run import FORCE, VIBRATION, Run, begun, followed, lasted
 from processors.events.share import Shares, share_pct, with_time
 from sparkplug.datatype import DataType
 from twin.vocabulary.twin_signals import PART_RECORD, STOP_REASON, TWIN_PREFIX
@@ -70,7 +71,8 @@ class Config(ProcessorConfig):
 @dataclass(frozen=True, slots=True)
 class State:
     """at_s: up to when time is added up; is_blind: what comes after it was not seen; execution: the last state that was known,
-    since since_ms; is_known: whether it still is; stop_s: how long the machine has stood; told_s: when shares were last told."""
+    since since_ms; is_known: whether it still is; stop_s: how long the machine has stood; told_s: when shares were last told;
+    is_joined: the machine stands as in mid-program, and how it came to that was not heard: going on is no beginning."""
 
     at_s: float | None = None
     is_blind: bool = False
@@ -84,12 +86,13 @@ class State:
     number: int = 0
     shares: Shares = field(default_factory=Shares)
     told_s: float = 0.0
+    is_joined: bool = False
 
     def having(self, run: Run | None, at_s: float | None, is_blind: bool, stop_s: float, shares: Shares) -> "State":
         """Return the state with these. Spelled out, since `replace` looks up each field, and there are many a second."""
         return State(
             at_s, is_blind, self.execution, self.since_ms, self.is_known, self.is_held, self.reason,
-            stop_s, run, self.number, shares, self.told_s,
+            stop_s, run, self.number, shares, self.told_s, self.is_joined,
         )  # fmt: skip
 
 
@@ -178,11 +181,12 @@ def _moved(config: Config, state: State, sample: Sample, now: Execution, outputs
     outputs += [Output(STATE, now.state), Output(STATE_BASIS, now.basis)]
     if now.state == before and not _is_another(state.run, program):
         return _named(state, program)  # said again after a while in which nothing was heard
+    is_seen = was_known and before is not None and sample.kind is not _BIRTH  # a birth says what holds, not since when
     if now.state != before:
         at_ms = round(sample.at_s * 1000)
         state = replace(state, execution=now.state, since_ms=at_ms)
-        outputs.append(Output(SINCE, _utc(at_ms), reason=None if was_known else "at the latest: it was not heard before"))
-    return _with_run(config, state, _Turn(sample, now.state, program, was_known and before is not None, outputs))
+        outputs.append(Output(SINCE, _utc(at_ms), reason=None if is_seen else "at the latest: it was not heard before"))
+    return _with_run(config, state, _Turn(sample, now.state, program, is_seen, outputs))
 
 
 def _named(state: State, program: str | None) -> State:
@@ -211,14 +215,18 @@ def _with_run(config: Config, state: State, turn: _Turn) -> State:
     """A run begins, is interrupted, or ends."""
     run = state.run
     if turn.now in (READY, COMPLETED):
+        state = replace(state, is_joined=False)
         return state if run is None else _ended(config, state, run, turn, "completed" if turn.now == COMPLETED else "ready")
     if turn.now != ACTIVE:
-        return state if run is None else replace(state, run=replace(run, interruptions=run.interruptions + turn.is_seen))
+        if run is None:
+            return state if turn.is_seen else replace(state, is_joined=True)
+        return replace(state, run=replace(run, interruptions=run.interruptions + turn.is_seen))
     if run is not None and _is_another(run, turn.program):
         state = _ended(config, state, run, turn, "next start")
     if state.run is None:
         mode = text(turn.sample.row, MODE)
-        return replace(state, run=begun(turn.sample, turn.program, mode, is_begin_seen=turn.is_seen))
+        is_begin_seen = turn.is_seen and not state.is_joined
+        return replace(state, is_joined=False, run=begun(turn.sample, turn.program, mode, is_begin_seen=is_begin_seen))
     return state
 
 
@@ -253,7 +261,7 @@ def _told_again(reason: str) -> tuple[Output, ...]:
 
 def _why(state: State, now: str, sample: Sample) -> str:
     """Return why the machine stands, or that it does not."""
-    return why_standing(now, sample, is_held=state.is_held) or NO_STOP
+    return NO_STOP if now == ACTIVE and not state.is_held else stop_reason(now, sample)
 
 
 def _stopped(state: State, sample: Sample, now: Execution, outputs: list[Output]) -> State:
@@ -294,7 +302,7 @@ def _utc(at_ms: int) -> str:
 _TEXT, _NUMBER, _MEASURED = DataType.STRING, DataType.DOUBLE, Provenance.MEASURED
 PROCESSOR = Processor(
     name="events",
-    version=1,
+    version=2,
     inputs=frozenset({EXECUTION, PROGRAM, MODE, ALARM, TOOL, CHANGING, FEED, *OVERRIDES}) | RECORD_INPUTS,
     alarms=machine_alarms,
     outputs=(

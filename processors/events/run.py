@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 from processors.alarms import machine_alarms
-from processors.events.execution import ACTIVE, OVERRIDES, is_changing_tool, stop_reason, tool
+from processors.events.execution import ACTIVE, OVERRIDES, tool
 from processors.sample import Sample, SampleKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
@@ -168,13 +168,6 @@ def followed(run: Run, sample: Sample) -> Run:
             else:
                 run = replace(run, raised_more=run.raised_more + 1)
     return run
-
-
-def why_standing(state: str, sample: Sample, *, is_held: bool) -> str:
-    """Why a run does not go on; '' while it does."""
-    if state == ACTIVE and not is_held:
-        return ""
-    return "tool change" if state != ACTIVE and is_changing_tool(sample.row) else stop_reason(state, sample)
 
 
 @cache

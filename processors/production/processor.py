@@ -263,7 +263,7 @@ _SECONDS_MEANING = {
 }
 PROCESSOR = Processor(
     name="production",
-    version=1,
+    version=2,
     inputs=frozenset({EXECUTION, PROGRAM, MODE, ALARM, CHANGING, FEED, FEED_OVERRIDE, POWER, LOAD, PART_QUALITY}),
     outputs=(
         *(OutputSpec(signal, _NUMBER, None, _RATIO_MEANING[name], _INFERRED, 0.001) for name, signal in RATIOS.items()),

@@ -118,7 +118,12 @@ def _faults(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[s
 
 def _pins(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:
     return [
-        {"t": pin.from_ms, "until": pin.to_ms, "kind": "pin", "text": f"kept for good: {pin.reason}"}
+        {
+            "t": max(pin.from_ms, from_ms),
+            "until": pin.to_ms,
+            "kind": "pin",
+            "text": f"raw data kept for good: {pin.reason.replace('_', ' ')}",
+        }
         for pin in store.pins(machine)
         if pin.from_ms < to_ms and pin.to_ms > from_ms
     ]

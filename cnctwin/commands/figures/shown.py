@@ -17,15 +17,15 @@ _SHOWN = {
 _RATIOS = ("availability", "performance", "quality", "oee", "energy_kwh")
 _HEADS = {
     "planned_s": "planned s",
-    "production_s": "run s",
-    "unknown_s": "unknown s",
+    "production_s": "production s",
+    "unknown_s": "not heard s",
     "availability": "avail.",
     "performance": "perf.",
     "oee": "OEE",
     "energy_kwh": "kWh",
     "energy_a_part_kwh": "kWh a part",
     "ideal_s": "ideal s",
-    "active_s": "active s",
+    "active_s": "actual s",
 }
 _STOPS_SHOWN = 3
 
@@ -46,6 +46,8 @@ def show(rows: list[Row], by: By, time_zone: str) -> None:
     if any(name in ("begin", "end") for name in names) or any(row.get("stops") for row in rows):
         console.print(f"times in {time_zone}", markup=False)
     reasons: dict[str, None] = {}
+    if (beside_s := sum(row.get("beside_s", 0.0) for row in rows)) >= 1.0:
+        reasons[f"{beside_s:.0f} s made in breaks or outside shifts, not counted"] = None
     for row in rows:
         stops = list(row.get("stops", {}).items())[:_STOPS_SHOWN]
         if stops:

@@ -58,6 +58,14 @@ def test_a_person_reads_them_with_the_stops_and_the_reasons(asked: list[str]) ->
     assert "[production]" not in done.stdout  # nothing is missing
 
 
+def test_what_is_made_outside_shifts_is_told_beside_the_table(asked: list[str], tmp_path: Path) -> None:
+    short = tmp_path / "short.toml"
+    short.write_text('time_zone = "UTC"\n' + CALENDAR.replace("14:51", "14:21"), encoding="utf-8")
+    shown = RUNNER.invoke(APP, [*asked, *_to(7200.0), "--all", "--by", "machine", "--calendar", str(short)]).stdout
+    assert "1350 s made in breaks or outside shifts, not counted" in shown  # 18 parts of 75 s
+    assert "breaks" not in RUNNER.invoke(APP, [*asked, *_to(7200.0), "--all", "--by", "machine"]).stdout
+
+
 def test_times_are_those_of_the_calendar_and_its_zone_is_named_once(asked: list[str], tmp_path: Path) -> None:
     berlin = tmp_path / "berlin.toml"
     calendar = CALENDAR.replace("14:51", "15:51").replace("13:51", "14:51")  # the same hour by another clock

@@ -136,3 +136,4 @@ def test_a_machines_figures_are_of_its_shifts_and_not_of_what_was_made_outside_t
     assert {name: both[name] for name in ("parts", "performance", "oee", "shifts")} == {
         name: alone[name] for name in ("parts", "performance", "oee", "shifts")
     }
+    assert (alone["beside_s"], both["beside_s"]) == (0.0, 600.0)  # counted beside, in no ratio

@@ -38,6 +38,7 @@ def told(began: int | None = None) -> tuple[list[ShiftTold], list[PartTold]]:
         "id": "b",
         "machine": "mill-01",
         "unknown_s": 9000.0,
+        "beside_s": 399.0,
         "production_s": 12600.0,
         "energy_kwh": None,
         "energy_s": 0.0,

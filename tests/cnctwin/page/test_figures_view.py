@@ -21,6 +21,7 @@ def test_the_figures_are_shown_and_what_is_not_known_says_why(visit: Visit, shop
     expect(
         page.get_by_text("Availability: the machine was not heard for too much of the planned time (mill-01, early).")
     ).to_be_visible()
+    expect(page.get_by_text("6 min 39 s made in breaks or outside shifts, not counted (mill-01, early).")).to_be_visible()
     bar = page.get_by_role("img").first
     expect(bar).to_have_attribute(
         "aria-label", f"production 6 h 00 min, mode MANUAL 45 min 0 s, feed hold 30 min 0 s, alarm: {HOSTILE} 15 min 0 s"

@@ -35,6 +35,48 @@ def test_nothing_is_drawn_beyond_the_newest_moment_that_is_known(visit: Visit) -
     assert shown == [True, True, True, True, [40, None]]
 
 
+def test_a_machine_is_offline_since_the_newest_moment_at_which_it_was_heard(visit: Visit) -> None:
+    """The fleet, the machine's state and the store tell it one after the other, and each knows more than the one before."""
+    visit.open("#/fleet")
+    shown = visit.evaluate("""
+      const [{ Plant }] = await Promise.all([module('plant')]);
+      const plant = new Plant(), stale = (t) => ({ value: 40, t, unit: '%', quality: 'stale' }), since = [];
+      plant.fleet([{ machine: 'lathe', online: false, last_t: 1000 }]);
+      const lathe = plant.machines.get('lathe'), tell = () => since.push(lathe.offlineSince);
+      tell();
+      lathe.state({ measured: { spindle_load_pct: stale(2000) }, twin: {}, online: false, now: 9000 });
+      tell();
+      const quality = ['good', 'good', 'stale'];
+      lathe.backfill({ signal: 'spindle_load_pct', t: [500, 3000, 4000], value: [30, 40, null], quality });
+      tell();
+      lathe.backfill({ signal: 'twin/raw_score', t: [5000], value: [1], quality: ['good'] });
+      tell();
+      lathe.setOnline(true, 6000);
+      tell();
+      return since;
+    """)
+    assert shown == [1000, 2000, 3000, 3000, None]
+
+
+def test_the_alarm_of_the_control_and_the_alert_of_a_moment_are_two_figures(visit: Visit) -> None:
+    visit.open("#/fleet")
+    shown = visit.evaluate("""
+      const [{ Machine }, { livedThrough }, { MomentShown }] =
+        await Promise.all([module('plant'), module('past'), module('views/moment_shown')]);
+      const now = Date.now(), known = new Machine('lathe');
+      known.state({ measured: { alarm: { value: '', t: now, quality: 'good' } }, twin: {}, online: true, now });
+      const t = [now - 60000, now - 30000];
+      const of = (signal, ...value) => ({ signal, unit: null, t, value, quality: [], reason: [null, null] });
+      const past = livedThrough(known, [of('alarm', 'EX1012', ''), of('twin/alert_state', 'none', 'firing')]);
+      const moment = new MomentShown();
+      return [now - 50000, now - 20000].map((t) => {
+        moment.write(past, t);
+        return [moment.parts.alarm.textContent, moment.parts.alert.textContent];
+      });
+    """)
+    assert shown == [["EX1012", "none"], ["none", "firing"]]
+
+
 def test_a_replay_adds_no_signal_to_what_the_machine_has_live(visit: Visit, shop: Shop) -> None:
     shop.without["vmc"] = re.compile("spindle_load_pct|twin/(alert_state|.*score.*|anomaly.*|gap_.*|tool_change_gate|spindle.*)")
     page = visit.open("#/fleet")

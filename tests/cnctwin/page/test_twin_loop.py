@@ -150,6 +150,7 @@ def test_the_keyboard_diagnoses(visit: Visit, told: Loop) -> None:
 def test_the_machine_view_tells_it_in_one_line(visit: Visit, told: Loop) -> None:
     told.step = "promoted"
     page = visit.open("#/machine/vmc")
+    expect(page.locator(".loopline")).to_contain_text("Cause found and taken into the twin")
     expect(page.locator(".loopline")).to_contain_text("Coolant cools: gap of the temperature 6.1 → 1.1 × repeatability")
     page.locator(".loopline a").click()
     expect(page).to_have_url(re.compile("#/gap/vmc"))

@@ -261,11 +261,21 @@ def test_the_whole_page_can_be_gone_through_by_keyboard(visit: Visit) -> None:
     page.keyboard.press("Escape")
     page.keyboard.press("?")
     expect(page.get_by_role("dialog")).to_contain_text("previous, next machine")
+    expect(page.get_by_role("dialog")).to_contain_text("on a load bar: 100 %")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).to_be_hidden()
     page.wait_for_timeout(100)
     page.keyboard.press("Tab")
     assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
+def test_a_dialog_of_one_view_does_not_stay_open_over_the_next(visit: Visit) -> None:
+    page = visit.open("#/fleet")
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    page.evaluate("location.hash = '#/alerts'")
+    expect(page.locator("body[data-view=alerts]")).to_be_visible()
+    expect(page.get_by_role("dialog")).to_be_hidden()
 
 
 def test_a_key_typed_before_the_event_of_a_new_address_belongs_to_the_new_view(visit: Visit) -> None:

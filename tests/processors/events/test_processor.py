@@ -108,6 +108,29 @@ def test_what_began_or_ended_unseen_has_no_cycle_time() -> None:
     assert [one["reasons"][0] for one in records(found)] == ["its beginning was not seen", "its end was not seen"]
 
 
+@pytest.mark.parametrize(
+    ("heard", "is_seen"),
+    [
+        ([birth(0.0, **READY | {"exec_state": "STOPPED", "alarm": "EX1012 NO OIL"})], False),
+        ([birth(0.0, **READY), death(2.0), birth(5.0, **READY | {"exec_state": "STOPPED"})], False),
+        ([birth(0.0, **READY), birth(5.0, **READY | {"exec_state": "ACTIVE"})], False),
+        ([birth(0.0, **READY), state(5.0, "STOPPED", alarm="EX1012 NO OIL")], True),
+        ([birth(0.0, **READY | {"exec_state": "STOPPED"}), state(5.0, "READY")], True),
+    ],
+    ids=["first heard standing", "back while it stands", "told by a birth", "an alarm between two parts", "reset meanwhile"],
+)
+def test_going_on_with_a_program_that_began_unheard_is_no_beginning(heard: list[HostEvent], is_seen: bool) -> None:
+    (record,) = records(told(*heard, state(10.0, "ACTIVE", alarm=""), state(70.0, "PROGRAM_COMPLETED")))
+    assert record["complete"] is is_seen
+    assert ("its beginning was not seen" in record["reasons"]) is not is_seen
+
+
+def test_the_part_after_one_that_was_joined_is_whole() -> None:
+    started = birth(0.0, **READY | {"exec_state": "STOPPED"})
+    turns = (state(10.0 * n, name) for n, name in enumerate(("ACTIVE", "READY", "ACTIVE", "STOPPED", "ACTIVE", "READY"), 1))
+    assert [record["complete"] for record in records(told(started, *turns))] == [False, True]
+
+
 def test_a_run_by_hand_is_no_part() -> None:
     found = told(birth(0.0, **READY | {"controller_mode": "MANUAL_DATA_INPUT"}), state(10.0, "ACTIVE"), state(40.0, "READY"))
     assert of(found, "cycle_number") == []
@@ -120,6 +143,12 @@ def test_a_run_by_hand_is_no_part() -> None:
         ({"exec_state": "PROGRAM_STOPPED"}, "program stop (M0)"),
         ({"exec_state": "OPTIONAL_STOP"}, "optional stop (M1)"),
         ({"exec_state": "INTERRUPTED", "tool_change_active": True}, "tool change"),
+        ({"exec_state": "FEED_HOLD", "tool_change_active": True}, "feed hold"),
+        ({"exec_state": "WAIT", "tool_change_active": True}, "tool change"),
+        ({"exec_state": "STOPPED", "tool_change_active": True, "alarm": "EX1012 NO OIL"}, "alarm: EX1012 NO OIL"),
+        ({"exec_state": "FEED_HOLD", "tool_change_active": True, "alarm": "FAULT 414 SERVO"}, "alarm: FAULT 414 SERVO"),
+        ({"exec_state": "STOPPED", "tool_change_active": True, "alarm": "WARNING 101 COOLANT LOW"}, "tool change"),
+        ({"exec_state": "STOPPED", "alarm": "WARNING 101 COOLANT LOW"}, "alarm: WARNING 101 COOLANT LOW"),
         ({"exec_state": "INTERRUPTED"}, "not told"),
         ({"exec_state": "STOPPED", "alarm": "FAULT 414 SERVO"}, "alarm: FAULT 414 SERVO"),
         ({"exec_state": "FEED_HOLD", "alarm": "FAULT 414 SERVO"}, "alarm: FAULT 414 SERVO"),

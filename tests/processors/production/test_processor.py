@@ -173,6 +173,7 @@ def test_what_is_not_known_is_null_with_its_reason(
         ({"exec_state": "ACTIVE", "feed_override_pct": 0.0}, "delay_s", "feed override 0 %"),
         ({"exec_state": "PROGRAM_STOPPED"}, "delay_s", "program stop (M0)"),
         ({"exec_state": "INTERRUPTED", "tool_change_active": True}, "delay_s", "tool change"),
+        ({"exec_state": "STOPPED", "tool_change_active": True, "alarm": "EX1012 NO OIL"}, "down_s", "alarm: EX1012 NO OIL"),
         ({"exec_state": "READY", "program": ""}, "delay_s", "no program"),
         ({"exec_state": "READY"}, "delay_s", "not told"),
         ({"exec_state": "STOPPED", "alarm": "FAULT: door", "controller_mode": "MANUAL"}, "down_s", "alarm: FAULT: door"),
@@ -199,6 +200,14 @@ def test_a_control_without_execution_state_produces_while_it_feeds(calendar: Pat
 def test_performance_can_be_above_one(calendar: Path) -> None:
     engine = engine_of(PROCESSOR, calendar=str(calendar), ideal_s={"O1": 125.0})
     assert _last(fed(engine, *_alive(640.0, *_shift_of_parts())))["performance"] == 1.25
+
+
+def test_a_part_that_was_joined_in_its_middle_says_nothing_of_the_performance(calendar: Path) -> None:
+    engine = engine_of(PROCESSOR, calendar=str(calendar), ideal_s={"O1": 114.0})
+    stream = [birth(0.0, **IDLE | {"exec_state": "STOPPED", "alarm": "EX1012 NO OIL"}), data(10.0, exec_state="ACTIVE", alarm="")]
+    actions = fed(engine, *stream, data(75.0, exec_state="READY"), data(90.0, ambient_temp_c=20.0))
+    (part,) = _records(actions, "part")
+    assert (part["complete"], part["active_s"], _last(actions)["performance"]) == (False, 65.0, None)
 
 
 def test_silence_is_unknown_and_never_running(calendar: Path) -> None:

@@ -1,7 +1,7 @@
 // The page: which view is open, the stream it wants, the state of the connection, and what the keyboard does everywhere.
 
 import { get, login } from "./api.js";
-import { openHelp, openLink, openLogin } from "./dialogs.js";
+import { closeForAnotherView, openHelp, openLink, openLogin } from "./dialogs.js";
 import { el, say, setHidden, setText } from "./dom.js";
 import { serverNow } from "./clock.js";
 import { painted } from "./lag.js";
@@ -316,7 +316,10 @@ document.querySelector(".skip").addEventListener("click", (event) => {
 document.getElementById("help").addEventListener("click", () => openHelp(app, EVERYWHERE));
 pill.addEventListener("click", () => openLink(app));
 login.needed = () => openLogin(app);
-addEventListener("hashchange", route);
+addEventListener("hashchange", () => {
+  if (location.hash !== shown) closeForAnotherView();
+  route();
+});
 addEventListener("error", (event) => say(`The page has an error: ${event.message}`));
 
 tabs();

@@ -28,6 +28,12 @@ function show(title, ...content) {
   return open;
 }
 
+/** Another view is opened: what was asked or told belongs to the one before; a log-in belongs to all. */
+export function closeForAnotherView() {
+  const open = dialog();
+  if (open.open && !open.querySelector("#token")) open.close();
+}
+
 const NAMES = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", " ": "Space" };
 
 export function openHelp(app, everywhere) {
@@ -74,6 +80,7 @@ export function openHelp(app, everywhere) {
         el("span", { class: "key gate" }),
         el("span", {}, "suppression window: a tool change and what follows it, when scores are not judged"),
       ),
+      el("li", {}, el("span", { class: "figure" }, "│"), el("span", {}, "on a load bar: 100 %; on a score bar: the threshold")),
       el("li", {}, el("span", { class: "key old" }), el("span", {}, "stale: nothing was heard in this stretch")),
       el("li", {}, el("span", { class: "figure" }, REPEATABILITY), el("span", {}, REPEATABILITY_MEANS.replace("repeatability: ", ""))),
     ),

@@ -139,6 +139,8 @@ export class Machine {
         values.map((value, i) => (typeof value === "number" && (column.quality?.[i] ?? "good") !== "stale" ? value : NaN)),
       );
     else series.merge(times, values);
+    const heard = values.findLastIndex((value, i) => value !== null && (column.quality?.[i] ?? "good") === "good");
+    if (!this.online && heard >= 0 && !column.signal.startsWith(TWIN_PREFIX)) this.setOnline(false, times[heard]);
   }
 
   /** Nothing was heard since `t`: lines end there, until they are filled up from the store or told anew. */
@@ -167,10 +169,12 @@ export class Machine {
     this.setOnline(Boolean(online), this.lastT === -Infinity ? null : this.lastT);
   }
 
+  /** at: when it was last heard; of several for one silence the newest holds, since what was heard later ended it later. */
   setOnline(online, at) {
-    if (online === this.online && (this.offlineSince === null) === online) return;
+    const since = online ? null : this.offlineSince === null || at > this.offlineSince ? at : this.offlineSince;
+    if (online === this.online && since === this.offlineSince) return;
     this.online = online;
-    this.offlineSince = online ? null : at;
+    this.offlineSince = since;
     this.changed.add("online");
   }
 }

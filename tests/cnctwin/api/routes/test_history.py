@@ -126,7 +126,7 @@ def test_events_are_what_the_signals_say(client: Client) -> None:
     assert seen == [
         ("execution", "READY", 0, 10_000),
         ("execution", "ACTIVE", 10_000, 700_000),
-        ("pin", "kept for good: anomaly", 15_000, 35_000),
+        ("pin", "raw data kept for good: anomaly", 15_000, 35_000),
         ("alarm", "spindle hot", 20_000, 30_000),
         ("tool_change", "tool change", 40_000, 46_000),
         ("part", "part made: O1000", 100_000, None),
@@ -297,6 +297,19 @@ def test_reasons_without_end_do_not_grow_a_trace_without_end() -> None:
 def test_every_declared_alarm_is_listed_as_an_event_and_what_is_told_beside_it_is_not() -> None:
     beside = {"twin/rule_detail", "twin/gap_basis", "twin/raw_score", "spindle_rpm"}
     assert set(event_signals({*alarm_signals(), *beside, "program"})) == {*alarm_signals(), "program"}
+
+
+def test_the_alarm_of_a_control_is_one_event_in_its_own_words() -> None:
+    texts = [Sample(0, "", 192, None), Sample(5, "EX1012 NO OIL", 192, None), Sample(9, "", 192, None)]
+    flags = [Sample(0, False, 192, None), Sample(6, True, 192, None), Sample(9, False, 192, None)]
+    told = events_of({"alarm": texts, "twin/control_alarm": flags})
+    assert [(one["kind"], one["text"], one["t"], one["until"]) for one in told] == [("alarm", "EX1012 NO OIL", 5, 9)]
+    assert [one["text"] for one in events_of({"twin/control_alarm": flags})] == ["control alarm"]
+
+
+def test_what_was_kept_from_before_a_stretch_is_told_at_its_beginning(client: Client) -> None:
+    told = client.get(f"/events/vmc?from={T0 + 20_000}&to={T0 + 30_000}").json()["events"]
+    assert [(one["t"] - T0, one["until"] - T0) for one in told if one["kind"] == "pin"] == [(20_000, 35_000)]
 
 
 def test_alarms_of_the_twin_are_events() -> None:

@@ -17,7 +17,7 @@ const BYS = [
   ["machine", "Machines"],
   ["program", "Programs"],
 ];
-const KINDS = lookup({ production: "production", setup: "setup", delay: "delay", down: "down, an alarm", unknown: "not heard" });
+const KINDS = lookup({ production: "production", setup: "setup", delay: "stands, no alarm", down: "down, an alarm", unknown: "not heard" });
 const BARS_MAX = 40;
 const PARTS_MAX = 200;
 const NAMED_MAX = 3;
@@ -29,12 +29,17 @@ const spent = (seconds) => (Number.isFinite(seconds) ? duration(1000 * Math.roun
 const named = (row) => (row.shift === undefined ? row.machine : `${row.machine}, ${row.shift ?? "no shift"}`);
 const when = (row, zone) => moment(row.begin, { seconds: false, zone }) + (row.over === false ? ", so far" : "");
 
-/** The reasons why figures are missing, each once, with the rows that it is of where it is not of all. */
-function reasons(rows) {
+/** Notes below the table: why figures are missing, and what was made beside planned time; with the rows, where it is not all of them. */
+function notes(rows) {
   const of = new Map();
   for (const row of rows)
     for (const [name, why] of Object.entries(row.why ?? {}))
       if (name !== "oee") of.set(`${name}: ${why}`, [...(of.get(`${name}: ${why}`) ?? []), named(row)]);
+  const beside = rows.filter((row) => row.beside_s >= 1);
+  if (beside.length) {
+    const seconds = beside.reduce((sum, row) => sum + row.beside_s, 0);
+    of.set(`${spent(seconds)} made in breaks or outside shifts, not counted`, beside.map(named));
+  }
   const whose = (names) => {
     const each = [...new Set(names)],
       more = each.length - NAMED_MAX;
@@ -208,7 +213,7 @@ export function open(app, { machine: asked }) {
       const rows = list(main?.rows),
         zone = knownZone(main?.time_zone);
       setText(zoneSaid, `Times in ${zone}${zone === "UTC" ? "" : ", the time zone of the shift calendar"}.`);
-      shifts.replaceChildren(...(rows.length ? [oee(rows, chosen.by, zone), reasons(rows)].filter(Boolean) : [nothing(main?.note ?? "")]));
+      shifts.replaceChildren(...(rows.length ? [oee(rows, chosen.by, zone), notes(rows)].filter(Boolean) : [nothing(main?.note ?? "")]));
       stops.replaceChildren(...list(bars?.rows).slice(-BARS_MAX).map((row) => stopBar(row, zone)).filter(Boolean));
       made.replaceChildren(parts(list(each?.rows), zone));
     } catch (error) {

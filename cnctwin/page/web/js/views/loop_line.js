@@ -7,12 +7,13 @@ import { told } from "./twin_parts.js";
 const ASK_MS = 3000;
 
 export function loopLine(app, name) {
-  const said = el("span"),
+  const about = el("strong"),
+    said = el("span"),
     stop = new AbortController();
   const element = el(
     "p",
     { class: "loopline", hidden: true },
-    el("strong", {}, "Twin"),
+    about,
     said,
     el("a", { href: app.address("gap", name) }, "See the gap"),
   );
@@ -21,7 +22,9 @@ export function loopLine(app, name) {
     if (document.hidden) return;
     try {
       const loop = await get(["twin", part(name)].join("/"), { signal: stop.signal });
-      const text = loop.step === "promoted" && loop.last ? loop.last.text : loop.text;
+      const isTaken = loop.step === "promoted" && Boolean(loop.last),
+        text = isTaken ? loop.last.text : loop.text;
+      setText(about, isTaken ? "Cause found and taken into the twin" : "Twin");
       setHidden(element, !text);
       setText(said, told(text));
     } catch (error) {

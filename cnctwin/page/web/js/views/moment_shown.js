@@ -25,8 +25,9 @@ export class MomentShown {
       named("spindle_load_pct", "Load"),
       named("feed_mm_min", "Feed"),
       named("score", "Adjusted score"),
+      named("alarm", "Control alarm"),
       named("alert", "Alert"),
-      named("description", "Description", "wide"),
+      named("description", "Twin's description", "wide", "the description of the machine by which the twin computed then"),
     );
   }
 
@@ -50,6 +51,7 @@ export class MomentShown {
     put("feed_mm_min", unit("feed_mm_min", "mm/min"));
     put("score", at(SCORES.adjusted) === null ? null : number(at(SCORES.adjusted)));
     put("description", description);
-    put("alert", at("alarm") || (at(ALERT_STATE) ?? null));
+    put("alarm", at("alarm") === "" ? "none" : at("alarm"));
+    put("alert", at(ALERT_STATE));
   }
 }

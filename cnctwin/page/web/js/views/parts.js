@@ -159,7 +159,7 @@ function parts(found) {
         el(
           "tr",
           {},
-          ["Made", "Program", "Part", "Cycle", "Tools", "Hottest", "Force, largest", `Gap, ${REPEATABILITY}`, "How it ended", ""].map(
+          ["Made", "Program", "Part", "Cycle", "Tools", "Spindle, hottest", "Force, largest", `Gap, ${REPEATABILITY}`, "How it ended", ""].map(
             (text, i) => columnHead(text, [2, 3, 5, 6, 7].includes(i)),
           ),
         ),
