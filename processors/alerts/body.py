@@ -8,6 +8,7 @@ from typing import Any
 
 from processors.alerts.config import AlertsConfig
 from processors.alerts.facts import Fact
+from processors.alerts.phases import Flapping
 from processors.alerts.state import Alert, Severity, labels_of
 from processors.alerts.words.wording import Wording
 from processors.config import Configuration
@@ -45,12 +46,14 @@ def iso(at_ms: int) -> str:
     return f"{stamp.removesuffix('+00:00')}Z"
 
 
-def as_alert(alert: Alert, config: AlertsConfig, words: Wording) -> dict[str, Any]:
-    """One alert as Alertmanager writes it; config: that of its machine. It stays the same while nothing happens."""
+def as_alert(alert: Alert, config: AlertsConfig, words: Wording, flapping: Flapping | None = None) -> dict[str, Any]:
+    """Return one alert as Alertmanager writes it; config: that of its machine. It stays the same while nothing happens, but for
+    one that comes and goes."""
     labels = labels_of(alert.machine, alert.name, alert.signal, config.labels) | {"severity": alert.severity.value}
-    annotations = {"summary": f"{alert.machine}: {words.summary(alert)}"}
-    told = {"description": words.details(alert), "advice": words.advice(alert)}
+    annotations = {"summary": f"{alert.machine}: {words.summary(alert, flapping)}"}
+    told = {"description": words.details(alert, flapping), "advice": words.advice(alert, flapping)}
     told |= {name: _written(alert.facts[name]) for name in FACTS_TOLD if name in alert.facts}
+    told |= {name: _written(one) for name, one in words.comes_and_goes(alert, flapping).items()}
     told |= {"unknown": alert.unknown, "acknowledged_by": alert.acknowledged_by}
     annotations |= {name: text for name, text in told.items() if text}
     return {
@@ -68,9 +71,14 @@ def _written(fact: Fact) -> str:
     return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
 
 
-def body(notice: Notice, configuration: Configuration[AlertsConfig], words: Wording) -> dict[str, Any]:
-    """The webhook's JSON."""
-    shown = [as_alert(alert, configuration.of(alert.machine), words) for alert in notice.alerts[:ALERTS_A_BODY_MAX]]
+def body(
+    notice: Notice, configuration: Configuration[AlertsConfig], words: Wording, flapping: Mapping[str, Flapping]
+) -> dict[str, Any]:
+    """Return the webhook's JSON; flapping: by fingerprint, those of its alerts that come and go."""
+    shown = [
+        as_alert(alert, configuration.of(alert.machine), words, flapping.get(alert.fingerprint))
+        for alert in notice.alerts[:ALERTS_A_BODY_MAX]
+    ]
     return {
         "version": "4",
         "groupKey": notice.group,
