@@ -36,7 +36,7 @@ def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, cloc
         "says": list(notice.says),
         "created": iso(round(wall_s * 1000)),
         "expires_s": wall_s + notice.expires_s,
-        "body": body(notice, configuration, words, occasion.flapping),
+        "body": body(notice, configuration, words, occasion.flapping, round(wall_s * 1000)),
     }
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False)
 
@@ -52,13 +52,14 @@ class _Model(BaseModel):
 
 
 class WrittenAlert(_Model):
-    """One alert of a notification: the part of Alertmanager's JSON that identifies it."""
+    """One alert of a notification: the part of its JSON that identifies it."""
 
     fingerprint: Name
     labels: dict[str, str]
     annotations: dict[str, str] = {}
     started: str = Field(default="", alias="startsAt")
     ended: str = Field(alias="endsAt")
+    episode: int = Field(default=0, ge=0)
 
 
 class _Body(_Model):

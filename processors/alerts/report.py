@@ -65,7 +65,7 @@ def _of_machine(alerts: Sequence[Alert]) -> tuple[str, int, str]:
 def _said(alert: Alert) -> str:
     by = f" by {alert.acknowledged_by}" if alert.acknowledged_by else ""
     unknown = ", now unknown" if alert.unknown else ""
-    return f"{alert.severity.value}: {alert.name} {alert.phase.value}{by} since {iso(alert.episode)}{unknown}"
+    return f"{alert.severity.value}: {alert.name} {alert.phase.value}{by} since {iso(began_ms(alert))}{unknown}"
 
 
 # The state.
@@ -121,9 +121,7 @@ def _alert(alert: Alert, config: AlertsConfig, state: AlertsState, words: Wordin
         "phase": alert.phase.value,
         "severity": alert.severity.value,
         "severities": [severity.value for severity in alert.severities],
-        "episode": alert.episode,
         "since": _wall(alert.since_wall_s),
-        "began": iso(began_ms(alert)),
         "unknown": alert.unknown,
         "flapping": flapping is not None,
         "acknowledged_by": alert.acknowledged_by,

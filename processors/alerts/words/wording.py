@@ -27,7 +27,6 @@ MINUTE_S, HOUR_S, DAY_S = 60.0, 3600.0, 86_400.0
 SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError, RecursionError, MemoryError)
 """Whatever a template of somebody's own may run into."""
 
-
 KNOWN = frozenset(
     {
         *("kind", "alerts", "first", "count", "others", "machines", "notes", "who", "machine", "alert", "name", "signal_name"),
@@ -146,13 +145,16 @@ class Wording:
         """Return what to do first; "" where nothing is known of it, or it is over."""
         return self._said(alert, flapping).advice
 
+    def reason(self, alert: Alert) -> str:
+        """Return why the alarm of an alert cannot be read now; "" where it can be."""
+        return self._words.reasons.get(alert.unknown, alert.unknown)
+
     def comes_and_goes(self, alert: Alert, flapping: Flapping | None) -> dict[str, str | int]:
         """Return how often an alert that flaps has come within how long, and for how long it has been gone; else nothing."""
         if flapping is None or not alert.is_on:
             return {}
-        within, stays_away = self._duration(flapping.within_s), self._duration(flapping.stays_away_s)
-        away_for = self._duration(flapping.away_s or None)
-        return {"times": flapping.times, "within": within, "away_for": away_for, "stays_away": stays_away}
+        spans_s = {"within": flapping.within_s, "away_for": flapping.away_s or None, "stays_away": flapping.stays_away_s}
+        return {"times": flapping.times, **{name: self._duration(span_s) for name, span_s in spans_s.items()}}
 
     def link(self, alert: Alert) -> str:
         """Return the address of the moment on the page; "" without a page."""
@@ -208,7 +210,7 @@ class Wording:
             "severity": words.severities.get(alert.severity.value, alert.severity.value),
             "is_on": alert.is_on or alert.phase is Phase.PENDING,
             "acknowledged_by": alert.acknowledged_by,
-            "unknown": words.reasons.get(alert.unknown, alert.unknown),
+            "unknown": self.reason(alert),
             "since": self._moment(began_ms(alert)),
             "ended": "" if alert.is_on or not alert.ended_ms else self._moment(max(alert.ended_ms, alert.episode)),
             **more,
@@ -216,7 +218,7 @@ class Wording:
         for name, terms in (("side", words.sides), ("regime", words.regimes), ("away_unit", words.units), ("unit", words.units)):
             if name in alert.facts:
                 facts[name] = terms.get(str(alert.facts[name]), alert.facts[name])
-        facts["for_lasting"] = self._rendered(words.for_lasting, facts) if facts.get("lasting") else ""
+        facts["for_lasting"] = self._rendered(words.for_lasting, facts) if facts.get("lasting") or facts.get("times") else ""
         return facts
 
     def _signal_name(self, signal: str) -> str:
