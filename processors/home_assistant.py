@@ -46,6 +46,7 @@ DOCUMENTS = frozenset(
         twin_signals.PRODUCTION,
         twin_signals.PRODUCTION_NOW,
         twin_signals.RULE_FINDINGS,
+        twin_signals.CONTROL_ALARM_FINDINGS,
         twin_signals.STOPS,
         "alarms",
         "alarm_history",

@@ -160,7 +160,8 @@ def _show(state: Mapping[str, Any]) -> None:
         console.print(text_table(OVER_COLUMNS, map(_over_row, latest)))
     for one in state.get("silences", ()):
         what = ", ".join(f"{name} {pattern}" for name, pattern in one["matchers"].items())
-        line = f"silence {one['id']}: {what}, until {one['ends'][:19]} by {one['by']} {one['comment']}".rstrip()
+        why = f": {one['comment']}" if one["comment"] else ""
+        line = f"silence {one['id']}: {what}, until {_moment(one['ends'])} UTC, by {one['by']}{why}"
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if state.get("receivers"):
         console.print()
@@ -173,12 +174,12 @@ def _alert_row(alert: Mapping[str, Any]) -> list[str]:
     notes += [f"silenced {alert['silenced_by']}"] if alert["silenced_by"] else []
     notes += ["UNDELIVERED"] if alert["undelivered"] else []
     phase = ", ".join([alert["phase"], *notes])
-    row = (*_named(alert), phase, _moment(alert["began"]), _lasting(alert["began"]))
+    row = (*_named(alert), phase, _moment(alert["startsAt"]), _lasting(alert["startsAt"]))
     return [*row, ", ".join(alert["told"]), alert["acknowledged_by"]]
 
 
 def _over_row(alert: Mapping[str, Any]) -> list[str]:
-    return [*_named(alert), _moment(alert["began"]), _moment(alert["endsAt"])]
+    return [*_named(alert), _moment(alert["startsAt"]), _moment(alert["endsAt"])]
 
 
 def _named(alert: Mapping[str, Any]) -> tuple[str, str, str]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
 from processors.alarms import alarm_signals, unknown_processors
 from processors.alerts.quiet import QuietHours
@@ -34,6 +34,8 @@ class Rule(BaseModel):
     for_s: the alarm has to stand so long before the alert fires
     keep_firing_for_s: it has to be gone so long before the alert is resolved
     raised_by_rule: high where a rule fires on the same machine
+    raised_by_control: high where the control gives its own alarm a high severity
+    enabled: False = it is no alert
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -42,6 +44,8 @@ class Rule(BaseModel):
     for_s: float = Field(default=0.0, ge=0.0, le=86_400.0)
     keep_firing_for_s: float = Field(default=60.0, ge=0.0, le=86_400.0)
     raised_by_rule: bool = False
+    raised_by_control: bool = False
+    enabled: bool = True
 
 
 class LagRule(Rule):
@@ -66,6 +70,7 @@ NAMED = {
     SCORE: Rule(severity=Severity.MEDIUM, raised_by_rule=True),
     GAP: Rule(severity=Severity.MEDIUM),
     DRIFT: Rule(severity=Severity.LOW),
+    twin_signals.CONTROL_ALARM: Rule(severity=Severity.MEDIUM, raised_by_control=True),
 }
 """The alarms whose severity is known here."""
 
@@ -112,6 +117,19 @@ class AlertsConfig(CellConfig):
     quiet_hours: tuple[QuietHours, ...] = Field(default=(), max_length=ROUTES_MAX)
     heartbeat: Heartbeat = Heartbeat()
 
+    @field_validator("signals", mode="before")
+    @classmethod
+    def _stand_over_the_defaults(cls, given: Any) -> Any:
+        """Return the rules of all alarms; of one that is given, its values over those that it has by default."""
+        if not isinstance(given, Mapping):
+            return given
+        known = _signals()
+        own = {
+            name: {**known[name].model_dump(), **rule} if name in known and isinstance(rule, Mapping) else rule
+            for name, rule in given.items()
+        }
+        return {**known, **own}
+
     @model_validator(mode="before")
     @classmethod
     def _says_no_secret(cls, table: Any) -> Any:
@@ -154,14 +172,13 @@ class AlertsConfig(CellConfig):
 
     def rule_of(self, name: str, signal: str) -> Rule | None:
         """The rule of an alert; None where it is not watched (any more)."""
-        if signal:
-            return self.signals.get(signal)
         rules = {
             MACHINE_OFFLINE: self.machine_offline,
             SOURCE_LOST: self.alarm_source_lost,
             PROCESSORS_BEHIND: self.processors_behind,
         }
-        return rules.get(name)
+        rule = self.signals.get(signal) if signal else rules.get(name)
+        return rule if rule is not None and rule.enabled else None
 
 
 def _receivers_of(route: Route) -> tuple[str, ...]:

@@ -8,6 +8,7 @@
     away, way               of a drift: by how many per cent the load has gone up or down
     value, left, …          of tool wear: load over a sharp one, parts left; tool: the one that wears fast
     value, limit, fed, …    of processors that are behind (processors/alerts/lag.py)
+    control_alarm, line     of the control's own alarm: its text, and the line of the NC at which it came up
     program, tool           what the machine was doing; control: the alarm that the control itself shows then
 
 What is not known is left out. Nothing is taken from a reading that is not good.
@@ -18,7 +19,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from processors.control_alarms import NO_TEXT, NONE
+from processors.control_alarms import HIGH, NO_TEXT, NONE
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
@@ -27,13 +28,14 @@ PROGRAM, TOOL, CONTROL_ALARM = "program", "tool_number", "alarm"
 INPUTS = frozenset(
     {
         *(PROGRAM, TOOL, CONTROL_ALARM, twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_FINDINGS),
-        *(twin_signals.TOOL_LIVES, twin_signals.MACHINE_DRIFT_FINDINGS, twin_signals.CONTROL_ALARM_TEXT),
+        *(twin_signals.TOOL_LIVES, twin_signals.MACHINE_DRIFT_FINDINGS),
+        *(twin_signals.CONTROL_ALARM_TEXT, twin_signals.CONTROL_ALARM_FINDINGS),
     }
 )
 PARSED = frozenset(
     {
         *(twin_signals.ANOMALY_WHY, twin_signals.RULE_FINDINGS, twin_signals.GAP_FINDINGS, twin_signals.TOOL_LIVES),
-        twin_signals.MACHINE_DRIFT_FINDINGS,
+        *(twin_signals.MACHINE_DRIFT_FINDINGS, twin_signals.CONTROL_ALARM_FINDINGS),
     }
 )
 """Signals whose text is JSON: read as a whole, and not shown."""
@@ -60,6 +62,8 @@ def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
     elif signal == twin_signals.CONTROL_ALARM:
         shown = _text(row, twin_signals.CONTROL_ALARM_TEXT)
         facts["control_alarm"] = "" if shown in (NONE, NO_TEXT) else shown
+        if (line := _number(_of_control_alarm(row).get("line"))) is not None:
+            facts["line"] = line
     elif signal == twin_signals.GAP_GROWING:
         facts |= _of_gap(_first(_text(row, twin_signals.GAP_FINDINGS)), at_ms)
     elif signal == twin_signals.TOOL_WEARS_FAST:
@@ -72,6 +76,15 @@ def facts_of(signal: str, row: Row, at_ms: int) -> Facts:
     if signal in OF_WEEKS:
         doing |= {"program": "", "tool": ""}
     return {name: fact for name, fact in (doing | facts).items() if fact != ""}
+
+
+def control_says_high(row: Row) -> bool:
+    """Return True if the control gives an alarm that stands a high severity."""
+    return _of_control_alarm(row).get("severity") == HIGH
+
+
+def _of_control_alarm(row: Row) -> Mapping[str, Any]:
+    return _object(_text(row, twin_signals.CONTROL_ALARM_FINDINGS))
 
 
 def _of_rule(rule: str, row: Row, at_ms: int) -> Facts:

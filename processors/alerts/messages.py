@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from processors.alerts.body import Notice
+from processors.alerts.body import TEST, Notice
 from processors.alerts.notification import Name, Notification
 from processors.alerts.outbox import made, recalled, settled
 from processors.alerts.state import (
@@ -178,7 +178,7 @@ def _test(configuration: Alerts, state: AlertsState, command: Trial) -> Done:
         return state, False, f"there is no receiver {command.receiver!r}; there are: {', '.join(receivers) or 'none'}"
     key = sha256(command.id.encode("utf-8", "surrogatepass")).hexdigest()[:16]
     notes = (wording_of(configuration, command.receiver).asked_by(command.by),)
-    notice = Notice(command.receiver, "test", "test", {}, (), (f"test.{key}",), notes, TEST_EXPIRES_S)
+    notice = Notice(command.receiver, TEST, TEST, {}, (), (f"test.{key}",), notes, TEST_EXPIRES_S)
     item = made(notice, configuration, state.wall_s, state.clock_s)
     return replace(state, outbox=state.outbox | {item.id: item}), True, item.id
 

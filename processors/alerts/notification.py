@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, body, iso, worst_of
-from processors.alerts.phases import flaps, rises_lately_s
+from processors.alerts.phases import Flapping, flapping_of
 from processors.alerts.statement import Statement, statements_in
-from processors.alerts.words.wording import Flapping, Occasion
+from processors.alerts.words.wording import Occasion
 from processors.alerts.words.wordings import Alerts, wording_of
 
 SAYS_MAX, SAYS_CHARACTERS_MAX = 5000, 200
@@ -36,20 +36,15 @@ def written(key: str, notice: Notice, configuration: Alerts, wall_s: float, cloc
         "says": list(notice.says),
         "created": iso(round(wall_s * 1000)),
         "expires_s": wall_s + notice.expires_s,
-        "body": body(notice, configuration, words),
+        "body": body(notice, configuration, words, occasion.flapping, round(wall_s * 1000)),
     }
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False)
 
 
 def _flapping(notice: Notice, configuration: Alerts, clock_s: float) -> dict[str, Flapping]:
-    """Return how often those of its alerts that flap have fired lately, by fingerprint."""
-    found = {}
-    for alert in notice.alerts:
-        config = configuration.of(alert.machine)
-        if flaps(alert, clock_s, config):
-            rises_s = rises_lately_s(alert, clock_s, config)
-            found[alert.fingerprint] = Flapping(len(rises_s), clock_s - rises_s[0], config.flap_keep_firing_for_s)
-    return found
+    """Return those of its alerts that come and go, by fingerprint."""
+    found = {alert.fingerprint: flapping_of(alert, clock_s, configuration.of(alert.machine)) for alert in notice.alerts}
+    return {key: flapping for key, flapping in found.items() if flapping is not None}
 
 
 class _Model(BaseModel):
@@ -57,13 +52,14 @@ class _Model(BaseModel):
 
 
 class WrittenAlert(_Model):
-    """One alert of a notification: the part of Alertmanager's JSON that identifies it."""
+    """One alert of a notification: the part of its JSON that identifies it."""
 
     fingerprint: Name
     labels: dict[str, str]
     annotations: dict[str, str] = {}
     started: str = Field(default="", alias="startsAt")
     ended: str = Field(alias="endsAt")
+    episode: int = Field(default=0, ge=0)
 
 
 class _Body(_Model):

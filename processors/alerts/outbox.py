@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 
 from processors.alerts.body import FACTS_TOLD, Notice, iso
+from processors.alerts.facts import Facts
 from processors.alerts.notification import Notification, WrittenAlert, written
 from processors.alerts.phases import Beat, caught_up
 from processors.alerts.state import (
@@ -113,7 +114,7 @@ def recalled(state: AlertsState, found: Notification, payload: str) -> AlertsSta
     """
     if found.id in state.outbox:
         return state
-    shown = {(one.fingerprint, _ms(one.started)): _alert(one) for one in found.alerts if _is_ours(one)}
+    shown = {(one.fingerprint, one.episode): _alert(one) for one in found.alerts if _is_ours(one)}
     is_later = found.created > iso(round(state.wall_s * 1000))
     known = state.receivers.get(found.receiver, ReceiverState())
     state = _caught_up(state, found, known, shown if is_later else {})
@@ -151,7 +152,10 @@ def _is_ours(one: WrittenAlert) -> bool:
 
 def _alert(one: WrittenAlert) -> Alert:
     """The alert of no episode yet. Raises ValueError where its severity or its end is none."""
-    labels = one.labels
+    labels, lasted_ms = one.labels, one.episode - _ms(one.started)
+    facts: Facts = {name: fact for name in FACTS_TOLD if (fact := one.annotations.get(name))}
+    if lasted_ms > 0:
+        facts["lasted_s"] = lasted_ms / 1000.0
     return Alert(
         labels["machine"],
         labels["alertname"],
@@ -160,7 +164,7 @@ def _alert(one: WrittenAlert) -> Alert:
         Severity(labels["severity"]),
         0,
         ended_ms=_ms(one.ended),
-        facts={name: fact for name in FACTS_TOLD if (fact := one.annotations.get(name))},
+        facts=facts,
     )
 
 

@@ -27,6 +27,29 @@ class Condition(NamedTuple):
     at_ms: int
 
 
+class Flapping(NamedTuple):
+    """An alert that comes and goes.
+
+    times, within_s: how often it has fired within how long
+    away_s: how long its alarm has been gone by now; None while it stands
+    stays_away_s: how long it has to be gone to be over
+    """
+
+    times: int
+    within_s: float
+    away_s: float | None
+    stays_away_s: float
+
+    def in_steps(self) -> "Flapping":
+        """Return it with durations that change once a minute at most, and every ten seconds within the first one.
+
+        >>> Flapping(4, 367.0, 24.0, 7200.0).in_steps()
+        Flapping(times=4, within_s=360.0, away_s=20.0, stays_away_s=7200.0)
+        """
+        away_s = None if self.away_s is None else _stepped(self.away_s)
+        return self._replace(within_s=_stepped(self.within_s), away_s=away_s)
+
+
 class Beat(NamedTuple):
     """The present: UTC, the clock that never goes back, and how much of it was watched since the last beat."""
 
@@ -122,21 +145,24 @@ def caught_up(alert: Alert, severity: Severity, episode: int, ended_ms: int | No
     return alert if ended_ms is None else _over(alert, beat, ended_ms)
 
 
-def flaps(alert: Alert, clock_s: float, config: AlertsConfig) -> bool:
-    """Return True if it has fired so often lately that each firing is no news."""
-    return len(rises_lately_s(alert, clock_s, config)) >= config.flap_episodes
-
-
-def rises_lately_s(alert: Alert, clock_s: float, config: AlertsConfig) -> tuple[float, ...]:
-    """Return when it fired within `flap_window_s`, or would have but for being kept firing, the first time first."""
-    return tuple(rise_s for rise_s in alert.rises_s if clock_s - rise_s <= config.flap_window_s)
+def flapping_of(alert: Alert, clock_s: float, config: AlertsConfig) -> Flapping | None:
+    """Return how it comes and goes, where it has fired so often lately, or would have but for being kept firing, that each
+    firing is no news."""
+    rises_s = [rise_s for rise_s in alert.rises_s if clock_s - rise_s <= config.flap_window_s]
+    if len(rises_s) < config.flap_episodes:
+        return None
+    return Flapping(len(rises_s), clock_s - rises_s[0], alert.clear_s, config.flap_keep_firing_for_s)
 
 
 def keep_firing_for_s(alert: Alert, rule: Rule, clock_s: float, config: AlertsConfig) -> float:
     """Return how long the alarm has to be gone."""
-    if flaps(alert, clock_s, config):
+    if flapping_of(alert, clock_s, config) is not None:
         return max(rule.keep_firing_for_s, config.flap_keep_firing_for_s)
     return rule.keep_firing_for_s
+
+
+def _stepped(seconds: float) -> float:
+    return seconds // 60.0 * 60.0 if seconds >= 60.0 else seconds // 10.0 * 10.0
 
 
 def _fired(alert: Alert, beat: Beat) -> Alert:

@@ -54,7 +54,10 @@ def _pulsed(config: AlertsConfig, state: AlertsState, sample: Sample) -> AlertsS
     up = {
         f"{sample.machine}\0{name}": sample.row[name].timestamp_ms
         for name in sample.changed
-        if name in config.signals and name in sample.row and sample.row[name].value is True
+        if (rule := config.signals.get(name)) is not None
+        and rule.enabled
+        and name in sample.row
+        and sample.row[name].value is True
     }
     if not up or len(state.pulses) >= PULSES_MAX:
         return state

@@ -9,7 +9,7 @@ from typing import Any
 from processors.alerts.body import as_alert, iso
 from processors.alerts.config import AlertsConfig
 from processors.alerts.notices import silenced_alerts
-from processors.alerts.phases import flaps
+from processors.alerts.phases import flapping_of
 from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Silence
 from processors.alerts.words.wording import Wording, began_ms
 from processors.alerts.words.wordings import wording_of
@@ -65,7 +65,7 @@ def _of_machine(alerts: Sequence[Alert]) -> tuple[str, int, str]:
 def _said(alert: Alert) -> str:
     by = f" by {alert.acknowledged_by}" if alert.acknowledged_by else ""
     unknown = ", now unknown" if alert.unknown else ""
-    return f"{alert.severity.value}: {alert.name} {alert.phase.value}{by} since {iso(alert.episode)}{unknown}"
+    return f"{alert.severity.value}: {alert.name} {alert.phase.value}{by} since {iso(began_ms(alert))}{unknown}"
 
 
 # The state.
@@ -115,16 +115,15 @@ def _document(configuration: Configuration[AlertsConfig], state: AlertsState) ->
 
 def _alert(alert: Alert, config: AlertsConfig, state: AlertsState, words: Wording, silence: str) -> dict[str, Any]:
     told = {name: known.told[alert.fingerprint] for name, known in state.receivers.items() if alert.fingerprint in known.told}
+    flapping = flapping_of(alert, state.clock_s, config)
     return {
-        **as_alert(alert, config, words),
+        **as_alert(alert, config, words, flapping and flapping.in_steps()),
         "phase": alert.phase.value,
         "severity": alert.severity.value,
         "severities": [severity.value for severity in alert.severities],
-        "episode": alert.episode,
         "since": _wall(alert.since_wall_s),
-        "began": iso(began_ms(alert)),
         "unknown": alert.unknown,
-        "flapping": flaps(alert, state.clock_s, config),
+        "flapping": flapping is not None,
         "acknowledged_by": alert.acknowledged_by,
         "comment": alert.comment,
         "silenced_by": silence,

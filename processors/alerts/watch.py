@@ -8,19 +8,20 @@ from typing import NamedTuple
 from processors.alerts import lag
 from processors.alerts.config import MACHINE_OFFLINE, NAMED, PROCESSORS_BEHIND, RULES, SOURCE_LOST, AlertsConfig, Rule
 from processors.alerts.facts import INPUTS as FACT_INPUTS
-from processors.alerts.facts import Facts, facts_of
+from processors.alerts.facts import Facts, control_says_high, facts_of
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
+from twin.vocabulary.twin_signals import CONTROL_ALARM, SEVERITY, TWIN_PREFIX
 
 INPUTS = frozenset({*NAMED, SEVERITY, *FACT_INPUTS})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
 OFFLINE = "the machine is offline"
+NOT_HEARD = "not heard again since the processors started"
 NOT_LOST = Condition(False, "", 0)
 _STALE = Quality.STALE
 
@@ -111,7 +112,10 @@ def _all(
     pulses = state.pulses
     for machine, last_s in machines.items():
         config, row = configuration.of(machine), cell.get(machine)
+        gone = OFFLINE if machine in state.deaths else NOT_HEARD  # a machine that leaves while we listen tells us by its death
         for signal, rule in config.signals.items():
+            if not rule.enabled:
+                continue
             reading = None if row is None else row.get(signal)
             pulse_ms = pulses.get(f"{machine}\0{signal}") if pulses else None
             is_up = pulse_ms is not None or (reading is not None and reading.value is True)
@@ -119,18 +123,19 @@ def _all(
                 continue
             name = signal.removeprefix(TWIN_PREFIX)
             if is_up or (machine, name) in known:
-                condition = condition_of(reading) if row is not None else Condition(None, OFFLINE, 0)
+                condition = condition_of(reading) if row is not None else Condition(None, gone, 0)
                 if pulse_ms is not None and not condition.stands and rule.for_s == 0.0:
                     condition = Condition(True, "", pulse_ms)
                 if condition.stands or (machine, name) in known:
                     yield Watched(machine, name, signal, rule, condition)
-        if config.machine_offline is not None and (row is None or (machine, MACHINE_OFFLINE) in known):
+        offline, source_lost = config.machine_offline, config.alarm_source_lost
+        if offline is not None and offline.enabled and (row is None or (machine, MACHINE_OFFLINE) in known):
             died_ms = state.deaths.get(machine, round(last_s * 1000))
-            yield Watched(machine, MACHINE_OFFLINE, "", config.machine_offline, Condition(row is None, "", died_ms))
-        if config.alarm_source_lost is not None:
-            lost = _source(config, row)
+            yield Watched(machine, MACHINE_OFFLINE, "", offline, Condition(row is None, "", died_ms))
+        if source_lost is not None and source_lost.enabled:
+            lost = _source(config, row) if row is not None else Condition(None, gone, 0)
             if lost.stands or (machine, SOURCE_LOST) in known:
-                yield Watched(machine, SOURCE_LOST, "", config.alarm_source_lost, lost)
+                yield Watched(machine, SOURCE_LOST, "", source_lost, lost)
 
 
 def _processors(
@@ -138,19 +143,17 @@ def _processors(
 ) -> Iterator[Watched]:
     """Yield the one alert of all processors that are behind."""
     rule, before = config.processors_behind, known.get((lag.PLANT, PROCESSORS_BEHIND))
-    if rule is None:
+    if rule is None or not rule.enabled:
         return
     condition, facts = lag.condition_of(state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s)
     if condition.stands or before is not None:
         yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, facts)
 
 
-def _source(config: AlertsConfig, row: Row | None) -> Condition:
+def _source(config: AlertsConfig, row: Row) -> Condition:
     """Return whether a processor that gave alarm signals has gone while the machine is there: nobody watches then, and no alarm
     is no good news."""
-    if row is None:
-        return Condition(None, OFFLINE, 0)
-    readings = map(row.get, config.signals)
+    readings = (row.get(signal) for signal, rule in config.signals.items() if rule.enabled)
     lost = [reading.timestamp_ms for reading in readings if reading is not None and reading.quality is _STALE]
     return Condition(True, "", max(lost)) if lost else NOT_LOST
 
@@ -158,23 +161,19 @@ def _source(config: AlertsConfig, row: Row | None) -> Condition:
 def _raised(
     configuration: Configuration[AlertsConfig], alerts: dict[str, Alert], cell: Mapping[str, Row], beat: Beat
 ) -> dict[str, Alert]:
-    """Raise the alerts that a rule confirms by firing on the same machine."""
+    """Raise the alerts that a rule confirms by firing on the same machine, and those that the control itself calls severe."""
     by_rule = {alert.machine for alert in alerts.values() if alert.is_on and alert.signal in RULES}
     said_high = {machine for machine, row in cell.items() if _says_high(row.get(SEVERITY))}
     worse = by_rule | said_high
-    if not worse:
-        return alerts
-    rises = {
-        key: raised(alert, Severity.HIGH, beat)
-        for key, alert in alerts.items()
-        if alert.machine in worse and alert.is_on and _may_rise(configuration.of(alert.machine), alert)
-    }
+    rises = {}
+    for key, alert in alerts.items():
+        is_severe = alert.signal == CONTROL_ALARM and alert.is_on and control_says_high(cell.get(alert.machine, {}))
+        if not is_severe and not (alert.is_on and alert.machine in worse):
+            continue
+        rule = configuration.of(alert.machine).rule_of(alert.name, alert.signal)
+        if rule is not None and ((rule.raised_by_rule and alert.machine in worse) or (rule.raised_by_control and is_severe)):
+            rises[key] = raised(alert, Severity.HIGH, beat)
     return alerts | rises
-
-
-def _may_rise(config: AlertsConfig, alert: Alert) -> bool:
-    rule = config.rule_of(alert.name, alert.signal)
-    return rule is not None and rule.raised_by_rule
 
 
 def _says_high(reading: Reading | None) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from processors.contract import Sample, SampleKind
-from processors.control_alarms import ALARM, ALARMS, TEXT, Config, State, step
+from processors.control_alarms import ALARM, ALARMS, FINDINGS, LINE, TEXT, Config, State, step
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
@@ -43,7 +43,26 @@ SERVO = {
 )
 def test_an_alarm_counts_by_state_and_severity(alarm: dict[str, Any], counts: bool) -> None:
     found = told([alarm])
-    assert found == {ALARM: counts, TEXT: "414 X AXIS DETECTION ERROR" if counts else "none"}
+    assert (found[ALARM], found[TEXT]) == (counts, "414 X AXIS DETECTION ERROR" if counts else "none")
+
+
+@pytest.mark.parametrize(
+    "severity, found", [("Fault", "high"), ("error", "medium"), (900, "high"), (899, "medium"), ("warning", None)]
+)
+def test_one_that_counts_is_high_or_medium_by_its_own_severity(severity: Any, found: str | None) -> None:
+    assert json.loads(told([SERVO | {"severity": severity}])[FINDINGS]) == ({"severity": found} if found else {})
+
+
+def test_the_line_is_that_at_which_the_alarm_came_up() -> None:
+    state, lines = State(), []
+    for line, alarms in ((51, []), (52, [SERVO]), (53, [SERVO, SERVO]), (54, []), (None, [SERVO])):
+        row = {ALARMS: Reading(ALARMS, json.dumps(alarms), 1000, Quality.GOOD, None, None, False)}
+        quality = Quality.BAD if line is None else Quality.GOOD
+        row[LINE] = Reading(LINE, line, 1000, quality, None, None, False)
+        state, outputs = step(Config(), state, Sample("vmc", SampleKind.DATA, 1.0, row, (ALARMS, LINE)))
+        findings = next(one.value for one in outputs if one.name == FINDINGS)
+        lines.append(json.loads(str(findings)).get("line"))
+    assert lines == [None, 52, 52, None, None]
 
 
 def test_what_has_no_severity_counts_where_that_is_asked_for_and_what_is_ignored_never_does() -> None:
@@ -52,7 +71,7 @@ def test_what_has_no_severity_counts_where_that_is_asked_for_and_what_is_ignored
         SERVO | {"severity": None, "code": code, "text": text}
         for code, text in (("EX1003", "x"), ("7", "Door open"), ("9", "OIL"))
     ]
-    assert told(alarms, config) == {ALARM: True, TEXT: "9 OIL"}
+    assert told(alarms, config) == {ALARM: True, TEXT: "9 OIL", FINDINGS: '{"severity":"medium"}'}
 
 
 def test_three_are_named_and_the_rest_is_counted() -> None:
@@ -62,7 +81,7 @@ def test_three_are_named_and_the_rest_is_counted() -> None:
 
 @pytest.mark.parametrize("text", ["", "[", '{"code": 1}', "7", "[" * 100_000])
 def test_a_text_that_is_no_list_is_a_null_with_the_reason(text: str) -> None:
-    assert told(text) == dict.fromkeys((ALARM, TEXT), "alarms is no JSON list of alarms")
+    assert told(text) == dict.fromkeys((ALARM, TEXT, FINDINGS), "alarms is no JSON list of alarms")
 
 
 def test_what_is_stale_is_not_judged() -> None:

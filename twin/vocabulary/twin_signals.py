@@ -111,6 +111,8 @@ SEVERITY = f"{TWIN_PREFIX}severity"
 # control_alarms
 CONTROL_ALARM = f"{TWIN_PREFIX}control_alarm"
 CONTROL_ALARM_TEXT = f"{TWIN_PREFIX}control_alarm_text"
+CONTROL_ALARM_FINDINGS = f"{TWIN_PREFIX}control_alarm_findings"
+"""JSON text while it alarms: its severity (high, medium), and the NC line at which it came up, where that is known."""
 
 # events
 STOP_REASON = f"{TWIN_PREFIX}stop_reason"

@@ -14,6 +14,7 @@ from jinja2 import Template, TemplateError, Undefined, UndefinedError, meta
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from processors.alerts.lag import PLANT
+from processors.alerts.phases import Flapping
 from processors.alerts.state import ALERTS_MAX, Alert, Phase, Severity
 from processors.alerts.statement import Statement
 from processors.alerts.words.language import SUFFIX, Form, Language, Texts, language, language_in
@@ -25,7 +26,6 @@ _AXIS = re.compile(r"axis_([a-z]\d{0,2})_(.+)")
 MINUTE_S, HOUR_S, DAY_S = 60.0, 3600.0, 86_400.0
 SURPRISES = (TemplateError, ArithmeticError, ValueError, TypeError, LookupError, AttributeError, RecursionError, MemoryError)
 """Whatever a template of somebody's own may run into."""
-
 
 KNOWN = frozenset(
     {
@@ -52,14 +52,6 @@ class Missing(Undefined):
         self._fail_with_undefined_error()
 
 
-class Flapping(NamedTuple):
-    """An alert that comes and goes: how often it has fired within how long, and how long it has to stay away to be over."""
-
-    times: int
-    within_s: float
-    stays_away_s: float
-
-
 class Occasion(NamedTuple):
     """The occasion of a text.
 
@@ -77,6 +69,7 @@ class _Said(NamedTuple):
     """What is said of an alert, whatever the occasion."""
 
     alert: Alert
+    flapping: Flapping | None
     summary: str
     details: str
     advice: str
@@ -140,17 +133,28 @@ class Wording:
         """Return a note on who asked for a test."""
         return self._rendered(self._words.asked_by, {"who": who})
 
-    def summary(self, alert: Alert) -> str:
-        """Return an alert in one line that stays the same while the alert lasts."""
-        return self._said(alert).summary
+    def summary(self, alert: Alert, flapping: Flapping | None = None) -> str:
+        """Return an alert in one line that stays the same while the alert lasts, but for one that comes and goes."""
+        return self._said(alert, flapping).summary
 
-    def details(self, alert: Alert) -> str:
+    def details(self, alert: Alert, flapping: Flapping | None = None) -> str:
         """Return what the machine was doing, and why a score alarms."""
-        return self._said(alert).details
+        return self._said(alert, flapping).details
 
-    def advice(self, alert: Alert) -> str:
+    def advice(self, alert: Alert, flapping: Flapping | None = None) -> str:
         """Return what to do first; "" where nothing is known of it, or it is over."""
-        return self._said(alert).advice
+        return self._said(alert, flapping).advice
+
+    def reason(self, alert: Alert) -> str:
+        """Return why the alarm of an alert cannot be read now; "" where it can be."""
+        return self._words.reasons.get(alert.unknown, alert.unknown)
+
+    def comes_and_goes(self, alert: Alert, flapping: Flapping | None) -> dict[str, str | int]:
+        """Return how often an alert that flaps has come within how long, and for how long it has been gone; else nothing."""
+        if flapping is None or not alert.is_on:
+            return {}
+        spans_s = {"within": flapping.within_s, "away_for": flapping.away_s or None, "stays_away": flapping.stays_away_s}
+        return {"times": flapping.times, **{name: self._duration(span_s) for name, span_s in spans_s.items()}}
 
     def link(self, alert: Alert) -> str:
         """Return the address of the moment on the page; "" without a page."""
@@ -173,10 +177,7 @@ class Wording:
         news = {(said.fingerprint, said.episode): said.what for said in occasion.says}
         more: dict[str, Any] = {"lasting": self._duration(lasted_s(alert, occasion))}
         more["news"] = news.get((alert.fingerprint, alert.episode), "")
-        if alert.is_on and (flapping := occasion.flapping.get(alert.fingerprint)) is not None:
-            more |= {"times": flapping.times, "within": self._duration(flapping.within_s)}
-            more |= {"stays_away": self._duration(flapping.stays_away_s), "away_for": self._duration(alert.clear_s)}
-        facts = self._facts(alert, more)
+        facts = self._facts(alert, more | self.comes_and_goes(alert, occasion.flapping.get(alert.fingerprint)))
         return facts | {
             "what": self._what(alert, facts),
             "details": self._details(alert, facts),
@@ -184,15 +185,15 @@ class Wording:
             "link": self.link(alert),
         }
 
-    def _said(self, alert: Alert) -> _Said:
+    def _said(self, alert: Alert, flapping: Flapping | None) -> _Said:
         """Return what is said of an alert, rendered once for all the beats at which it is the same value."""
         known = self._rendered_of.get(alert.fingerprint)
-        if known is None or known.alert is not alert:
+        if known is None or known.alert is not alert or known.flapping != flapping:
             if len(self._rendered_of) >= ALERTS_MAX:
                 self._rendered_of.clear()
             lasting = self._duration(lasted_s(alert, Occasion(0.0))) if alert.phase is Phase.RESOLVED else ""
-            facts = self._facts(alert, {"lasting": lasting})
-            known = _Said(alert, self._what(alert, facts), self._details(alert, facts), self._advice(alert, facts))
+            facts = self._facts(alert, {"lasting": lasting} | self.comes_and_goes(alert, flapping))
+            known = _Said(alert, flapping, self._what(alert, facts), self._details(alert, facts), self._advice(alert, facts))
             self._rendered_of[alert.fingerprint] = known
         return known
 
@@ -209,7 +210,7 @@ class Wording:
             "severity": words.severities.get(alert.severity.value, alert.severity.value),
             "is_on": alert.is_on or alert.phase is Phase.PENDING,
             "acknowledged_by": alert.acknowledged_by,
-            "unknown": words.reasons.get(alert.unknown, alert.unknown),
+            "unknown": self.reason(alert),
             "since": self._moment(began_ms(alert)),
             "ended": "" if alert.is_on or not alert.ended_ms else self._moment(max(alert.ended_ms, alert.episode)),
             **more,
@@ -217,7 +218,7 @@ class Wording:
         for name, terms in (("side", words.sides), ("regime", words.regimes), ("away_unit", words.units), ("unit", words.units)):
             if name in alert.facts:
                 facts[name] = terms.get(str(alert.facts[name]), alert.facts[name])
-        facts["for_lasting"] = self._rendered(words.for_lasting, facts) if facts.get("lasting") else ""
+        facts["for_lasting"] = self._rendered(words.for_lasting, facts) if facts.get("lasting") or facts.get("times") else ""
         return facts
 
     def _signal_name(self, signal: str) -> str:

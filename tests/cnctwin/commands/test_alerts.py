@@ -115,10 +115,11 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
     assert code == 0
     silence = out.split()[1]
     assert f"silence {silence}: machine okuma, until " in cnctwin("list")[1]
-    assert "[new] tool" in cnctwin("list")[1]
+    assert " UTC, by ada: [new] tool" in cnctwin("list")[1]
     assert cnctwin("unsilence", silence, "--by", "ada") == (0, f"silence {silence} has ended\n", "")
     assert cnctwin("test", "desk") == (0, "desk: delivered\n", "")
     assert server.received[-1].json["groupKey"] == "test"
+    assert [one["annotations"]["test"] for one in server.received[-1].json["alerts"]] == ["true"]
     server.answers.append(Answer(401))
     assert cnctwin("test", "desk") == (1, "", "desk: failed: 127.0.0.1 answered 401\n")
     fire(edge, False)

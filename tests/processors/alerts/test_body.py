@@ -1,7 +1,10 @@
 """What a notification says, in Alertmanager's words."""
 
+import json
+
 from processors.alerts.words.language import language
 from tests.processors.alerts.courier.alert_shop import VIBRATION, Shop
+from twin.vocabulary.twin_signals import RULE_FINDINGS
 
 
 def test_the_body_is_that_of_alertmanagers_webhook_version_4() -> None:
@@ -30,7 +33,24 @@ def test_the_body_is_that_of_alertmanagers_webhook_version_4() -> None:
         "endsAt": "0001-01-01T00:00:00Z",
         "generatorURL": "https://twin.plant.example/#/replay/okuma?from=1794999700000&to=1795000300000&at=1795000000000",
         "fingerprint": shop.fingerprint(),
+        "episode": 1_795_000_000_000,
     }
+
+
+def test_a_beginning_is_when_it_began_to_be_so_wherever_it_is_told() -> None:
+    shop = Shop()
+    since_ms = 1_795_000_000_000 - 5000
+    shop.set(load=True, **{RULE_FINDINGS: json.dumps({"load_over_limit": {"value": 112, "limit": 100, "since": since_ms}})})
+    (told,) = shop.wait(20)
+    began = "2026-11-18T11:06:35.000Z"
+    assert told.body["alerts"][0]["startsAt"] == shop.alert("rule_load_over_limit")["startsAt"] == began
+    assert f"since {began}" in shop.metrics["okuma", "twin/alert_summary"]
+    shop.set(load=False)
+    (over,) = shop.wait(400)
+    (alert,) = over.body["alerts"]
+    assert alert["annotations"]["summary"] == "okuma: Over after 25 s: spindle load over its limit"
+    assert (alert["startsAt"], alert["endsAt"]) == (began, "2026-11-18T11:07:00.000Z")
+    assert over.text.startswith("From 2026-11-18 11:06:35 UTC to 2026-11-18 11:07:00 UTC")
 
 
 def test_a_body_holds_fifty_alerts_and_says_how_many_more_there_are() -> None:

@@ -11,7 +11,8 @@ from processors.alerts.state import Severity
 from processors.config import Configuration
 from processors.discovery import sample_configuration
 from processors.errors import ConfigurationError
-from tests.processors.alerts.courier.alert_shop import DESK
+from sparkplug.quality import Quality
+from tests.processors.alerts.courier.alert_shop import DESK, VIBRATION, Shop
 
 
 @pytest.mark.parametrize(
@@ -60,7 +61,27 @@ def test_the_alerts_that_the_sample_shows_are_the_defaults() -> None:
     shown = [line.removeprefix("# ") for line in lines if line.startswith(('# "twin/', "# [alerts.signals]"))]
     table = tomllib.loads("\n".join(shown))["alerts"]
     defaults = AlertsConfig()
-    assert len(table["signals"]) >= 7
+    assert set(table["signals"]) == set(defaults.signals)
     assert AlertsConfig.model_validate(table).signals.items() <= defaults.signals.items()
-    others = [rule.severity for name, rule in defaults.signals.items() if name not in table["signals"]]
-    assert set(others) <= {Severity.MEDIUM}
+
+
+def test_an_entry_changes_what_it_gives_and_no_other_alert() -> None:
+    defaults = AlertsConfig().signals
+    given = AlertsConfig.model_validate({"signals": {"twin/score_drift": {"severity": "medium"}}})
+    changed = defaults["twin/score_drift"].model_copy(update={"severity": Severity.MEDIUM})
+    assert given.signals == {**defaults, "twin/score_drift": changed}
+
+
+def test_what_is_not_enabled_is_no_alert() -> None:
+    shop = Shop(
+        signals={VIBRATION: {"enabled": False}},
+        machine_offline={"severity": "medium", "enabled": False},
+        alarm_source_lost={"severity": "medium", "enabled": False},
+    )
+    shop.set(vibration=True)
+    shop.set(drift=False, quality=Quality.STALE)
+    shop.set(load=True)
+    shop.wait(200)
+    shop.offline()
+    shop.wait(200)
+    assert {one["labels"]["alertname"] for one in shop.shown()["alerts"]} == {"rule_load_over_limit"}

@@ -362,6 +362,12 @@ def test_a_test_is_told_to_the_one_receiver() -> None:
     assert shop.command("test", receiver="desk")["done"]
     (told,) = shop.wait(5)
     assert (told.kind, told.title, told.text) == ("test", "Test of cnctwin's alerts", "Asked for by ada")
+    (alert,) = told.body["alerts"]
+    assert (told.body["status"], alert["status"], told.severity) == ("firing", "firing", "none")
+    assert alert["labels"] == {"alertname": "cnctwin_test", "machine": "test", "severity": "low"}
+    assert alert["annotations"] == {"summary": told.title, "description": told.text, "test": "true"}
+    assert alert["startsAt"] == "2026-11-18T11:06:40.000Z"
+    assert shop.alert("cnctwin_test", "test") is None  # nothing fires
     outcome = shop.command("test", receiver="nobody")
     assert outcome == {"done": False, "text": "there is no receiver 'nobody'; there are: desk"}
 

@@ -8,6 +8,7 @@ from processors.alerts.notification import Notification
 from processors.alerts.phases import Beat, caught_up
 from processors.alerts.state import Alert, AlertsState, Phase, Severity
 from tests.processors.alerts.courier.alert_shop import VIBRATION, Shop
+from twin.vocabulary.twin_signals import RULE_FINDINGS
 
 BRIEF = {"signals": {VIBRATION: {"severity": "medium", "keep_firing_for_s": 5.0}}, "group_interval_s": 10.0}
 BEAT = Beat(1_795_000_000.0, 100.0, 0.0)
@@ -61,6 +62,22 @@ def test_the_end_of_what_was_told_is_told_though_the_snapshot_knew_nothing_of_it
     }
     shop.wait(30)
     assert [one.split(".")[2] for payload in outbox(shop) for one in payload["says"]] == ["firing", "resolved"]
+
+
+def test_what_a_notification_tells_of_its_beginning_is_known_again() -> None:
+    shop = Shop(delivers=False, **BRIEF)
+    shop.set(load=False)
+    shop.wait(2)
+    snapshot = shop.state
+    since_ms = round(shop.wall_s * 1000) - 5000
+    shop.set(load=True, **{RULE_FINDINGS: json.dumps({"load_over_limit": {"value": 112, "limit": 100, "since": since_ms}})})
+    shop.wait(11)
+    shown = shop.alert("rule_load_over_limit")
+    shop.set(load=False)
+    back(shop, snapshot)
+    shop.wait(1)
+    again = shop.alert("rule_load_over_limit")
+    assert (again["startsAt"], again["episode"]) == (shown["startsAt"], shown["episode"])
 
 
 def test_what_was_told_before_the_snapshot_changes_no_alert() -> None:

@@ -126,11 +126,42 @@ def test_a_machine_that_is_offline_keeps_its_alerts_and_is_one_itself() -> None:
     assert shop.alert("machine_offline")["phase"] == "firing"
     assert shop.alert("machine_offline")["startsAt"] == "2026-11-18T11:07:00.000Z"
     assert (shop.alert()["phase"], shop.alert()["unknown"]) == ("firing", "the machine is offline")
+    assert shop.alert()["annotations"]["unknown"] == "the machine is offline"
     shop.rows["okuma"] = row
     shop.wait(70)
     assert shop.alert("machine_offline")["phase"] == "resolved"
     back_after_s = 20 + 30 + 40
     assert shop.alert("machine_offline")["endsAt"] <= iso(round((T0_S + back_after_s + 1) * 1000))  # not when its dwell was over
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "not heard again since the processors started"),
+        ("de", "seit dem Start der Prozessoren nicht wieder gehört"),
+    ],
+)
+def test_a_machine_that_is_not_heard_after_a_restart_is_not_said_to_be_offline(language: str, said: str) -> None:
+    shop = Shop(language=language)
+    shop.set(vibration=True)
+    shop.wait(20)
+    shop.restarted()
+    shop.rows.clear()  # its birth has not come yet
+    shop.wait(5)
+    assert shop.alert()["annotations"]["unknown"] == said
+
+
+def test_the_control_says_how_severe_its_own_alarm_is() -> None:
+    shop = Shop(quiet_hours=[{"time_zone": "UTC", "start": "00:00", "end": "23:59"}])
+    text = {"twin/control_alarm_text": "EX1012 SPINDLE LUBRICATION FAILURE"}
+    shop.set(**text, **{"twin/control_alarm_findings": '{"severity":"medium","line":52}'})
+    shop.set(**{"twin/control_alarm": True})
+    assert shop.wait(30) == []
+    assert shop.alert("control_alarm")["severity"] == "medium"
+    shop.set(**{"twin/control_alarm_findings": '{"severity":"high","line":52}'})
+    (told,) = shop.wait(30)
+    assert (told.severity, shop.alert("control_alarm")["severities"]) == ("high", ["medium", "high"])
+    assert "line 52" in told.text.lower()
 
 
 def test_a_machine_offline_for_less_than_its_dwell_wakes_nobody() -> None:

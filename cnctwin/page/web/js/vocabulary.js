@@ -71,6 +71,7 @@ export const RULE_FINDINGS = "twin/rule_findings";
 export const SEVERITY = "twin/severity";
 export const CONTROL_ALARM = "twin/control_alarm";
 export const CONTROL_ALARM_TEXT = "twin/control_alarm_text";
+export const CONTROL_ALARM_FINDINGS = "twin/control_alarm_findings";
 export const STOP_REASON = "twin/stop_reason";
 export const PART_RECORD = "twin/part_record";
 export const OEE = "twin/oee";

@@ -186,8 +186,15 @@ def test_an_alert_that_comes_and_goes_says_so_and_when_it_will_be_over() -> None
     assert shop.told[-1].title == "okuma: Spindle load 112 %, 4 times in 30 min, limit 100 %"
     said = "Comes and goes: 4 times in 30 min. Not every time is reported; its end is, once it has stayed away for 2 h."
     assert said in shop.told[-1].text.splitlines()
-    assert all(shop.alert("rule_load_over_limit")[name] for name in ("flapping", "began"))
+    (webhook,) = [one["annotations"] for one in shop.told[-1].body["alerts"] if one["status"] == "firing"]
+    assert webhook["summary"] == shop.told[-1].title
+    assert (webhook["times"], webhook["within"], webhook["stays_away"]) == ("4", "30 min", "2 h")
+    assert "away_for" not in webhook  # it stands
     shop.set(load=False)
+    shop.wait(130, beat_s=5.0)
+    shown = shop.alert("rule_load_over_limit")
+    assert shown["flapping"] and shown["annotations"]["away_for"] == "2 min"
+    assert shown["annotations"]["summary"] == "okuma: Spindle load 112 %, 4 times in 32 min, away for 2 min now, limit 100 %"
     (over,) = shop.wait(7300, beat_s=5.0)
     assert over.title == "okuma: Over after 17 s: spindle load over its limit"
     assert "Comes and goes" not in over.text
@@ -201,6 +208,9 @@ def test_the_same_in_german() -> None:
     assert said in told.text.splitlines()
     shop.set(load=False)
     (reminded,) = shop.wait(700, beat_s=5.0)
+    said = "okuma: Spindellast 112 %, 4-mal in 40 min, jetzt seit 9 min 55 s nicht mehr, Grenze 100 %"
+    assert reminded.title == f"{said} (Erinnerung)"
+    assert reminded.body["alerts"][0]["annotations"]["summary"] == said
     assert "Kommt und geht: 4-mal in 40 min, jetzt seit 9 min 55 s nicht mehr. Es wird" in reminded.text
 
 

@@ -11,6 +11,13 @@ import { anomalyPanel } from "./anomaly_panel.js";
 
 const RANK = lookup({ high: 0, medium: 1, low: 2 }),
   PHASE = lookup({ firing: 0, acknowledged: 1, pending: 2, resolved: 3 });
+
+/** The worst first: what fires unacknowledged, of that the most severe, of that the latest. */
+export const worstFirst = (a, b) =>
+  (PHASE[a.phase] ?? LAST) - (PHASE[b.phase] ?? LAST) ||
+  (RANK[a.severity] ?? LAST) - (RANK[b.severity] ?? LAST) ||
+  began(b) - began(a);
+
 const SIGNS = lookup({ firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" });
 const LAST = 9; // of a phase or a severity that nobody knows
 const AROUND_MS = 300000;
@@ -18,12 +25,16 @@ const RESOLVED_MAX = 20;
 const ANOMALY = "anomaly_alarm";
 const PANELS_MAX = 20;
 
+/** The name of an alert in words. */
+export const alertName = ({ labels = {} }) => words((labels.alertname ?? "alert").replace(/^rule_/, "").replace(/^twin\//, ""));
+
 /** The sentence of an alert without the machine before it; the alert's name where there is none. */
-function sentence({ labels = {}, annotations = {} }) {
+export function sentence(alert) {
+  const { labels = {}, annotations = {} } = alert;
   const told = annotations.summary ?? "",
     before = `${labels.machine ?? ""}: `;
   if (told) return told.startsWith(before) ? told.slice(before.length) : told;
-  return words((labels.alertname ?? "alert").replace(/^rule_/, "").replace(/^twin\//, ""));
+  return alertName(alert);
 }
 
 const began = (alert) => Date.parse(alert.startsAt);
@@ -104,6 +115,7 @@ export function open(app) {
     const { labels = {}, annotations = {} } = alert,
       machine = labels.machine ?? "",
       start = began(alert),
+      raised = alert.episode || start, // what it shows is of then; one that builds up for weeks began long before
       end = ended(alert);
     const facts = [
       el("span", {}, el("span", { class: "severity" }, alert.severity ?? ""), ` · ${alert.phase}`),
@@ -151,9 +163,9 @@ export function open(app) {
               {
                 class: "button",
                 href: app.address("replay", machine, {
-                  from: start - AROUND_MS,
-                  to: Math.min((end ?? start) + AROUND_MS, serverNow()),
-                  at: start,
+                  from: raised - AROUND_MS,
+                  to: Math.min((end ?? raised) + AROUND_MS, serverNow()),
+                  at: raised,
                 }),
               },
               "Replay",
@@ -267,12 +279,7 @@ export function open(app) {
     focused = body.contains(document.activeElement)
       ? (document.activeElement.closest("[data-fingerprint]")?.dataset.fingerprint ?? null)
       : null;
-    const all = [...(given.alerts ?? [])].sort(
-      (a, b) =>
-        (PHASE[a.phase] ?? LAST) - (PHASE[b.phase] ?? LAST) ||
-        (RANK[a.severity] ?? LAST) - (RANK[b.severity] ?? LAST) ||
-        began(b) - began(a),
-    );
+    const all = [...(given.alerts ?? [])].sort(worstFirst);
     const of = (...phases) => all.filter((one) => phases.includes(one.phase));
     const firing = of("firing"),
       taken = new Set(),
