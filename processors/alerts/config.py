@@ -62,7 +62,7 @@ class LagRule(Rule):
 
 
 NAMED = {
-    **dict.fromkeys(RULES, Rule(severity=Severity.HIGH)),
+    **dict.fromkeys((*RULES, twin_signals.CONTROL_ALARM), Rule(severity=Severity.HIGH)),
     SCORE: Rule(severity=Severity.MEDIUM, raised_by_rule=True),
     GAP: Rule(severity=Severity.MEDIUM),
     DRIFT: Rule(severity=Severity.LOW),
