@@ -50,6 +50,7 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: is no TOML: {error}") from error
+    _check_adapter_is_stated(tables, path)
     sections = {name: _section(path, name, kind, tables.pop(name, {})) for name, kind in _SECTIONS.items()}
     chosen: str = sections["machine"].adapter
     if chosen not in modules():
@@ -65,6 +66,17 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
         except ConfigError as error:
             raise ConfigError(f"{path}: {one.table}.address: {error}") from error
     return config
+
+
+def _check_adapter_is_stated(tables: dict[str, Any], path: Path) -> None:
+    """Refuse a file that holds nothing, and one with the table of a control that [machine] does not name."""
+    if not tables:
+        raise ConfigError(f"{path}: is empty; cnctwin edge discover ADDRESS > {path.name} drafts it")
+    machine = tables.get("machine", {})
+    default = MachineSection().adapter
+    named = next((name for name in tables if name in modules() and name != default), None)
+    if named is not None and default not in tables and isinstance(machine, dict) and "adapter" not in machine:
+        raise ConfigError(f'{path}: machine.adapter is missing; [{named}] needs adapter = "{named}" below [machine]')
 
 
 def _section(path: Path, name: str, kind: TypeAdapter[Any], raw: object) -> Any:

@@ -156,6 +156,13 @@ def identifier(name: str) -> str:
 def _entities(row: Mapping[str, Reading]) -> Iterator[Entity]:
     for name, reading in row.items():
         is_chosen = name.startswith((PLC_PREFIX, VARIABLE_PREFIX))  # by configuration, which may make a flag of it
-        kind = (None if is_chosen else kind_of_signal(name)) or _OF_TYPE.get(type(reading.value))
+        kind = _kind_of_chosen(reading) if is_chosen else kind_of_signal(name) or _OF_TYPE.get(type(reading.value))
         if kind is not None and name not in DOCUMENTS and twin_signals.live_name(name) is None:
             yield Entity(name, kind, reading.unit)
+
+
+def _kind_of_chosen(reading: Reading) -> Kind:
+    """Return the kind by the value. A null has a number's where it has a unit, else a text's, until a birth shows a value."""
+    if reading.value is None:
+        return Kind.NUMBER if reading.unit else Kind.TEXT
+    return _OF_TYPE.get(type(reading.value), Kind.TEXT)

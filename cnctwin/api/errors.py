@@ -78,6 +78,8 @@ def request_trouble(errors: Any, document: str = "/openapi.json") -> str:
     value = repr(first.get("input"))
     if first["type"] == "missing" if "type" in first else False:
         return f"{name} is missing; {document} has an example"
+    if first.get("type") == "model_attributes_type" and isinstance(first.get("input"), bytes):
+        return "the body is not taken as JSON; send Content-Type: application/json"
     shown = value if len(value) <= 60 else f"{value[:57]}…"
     if first.get("type") == "value_error" and len(places) <= 1:
         return said

@@ -65,7 +65,8 @@ def discover(
 def _table(rows: "Sequence[Row]") -> Table:
     """Return the signals that an edge would publish, for a person to read."""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
-    shown = Table(title=f"{signals} signals would be published", title_justify="left")
+    added = "the edge adds tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
+    shown = Table(title=f"{signals} signals would be published; {added}", title_justify="left")
     for column in ("signal", "from", "unit", "native unit", "value now", "why not"):
         shown.add_column(column, overflow="fold")
     for row in rows:

@@ -106,7 +106,7 @@ def import_shdr(recordings: Sequence[Path], devices: Path, device: str | None, o
         raise UsageError(str(error)) from None
     if not runs:
         raise UsageError(f"{names}: no signal of {devices.name} is in it; is it the Devices.xml that belongs to it?")
-    table = Table(title=f"{len(runs)} stretches in {names}", title_justify="left")
+    table = Table(title=f"{len(runs)} {'stretch' if len(runs) == 1 else 'stretches'} in {names}", title_justify="left")
     for column in ("file", "lasted", "rows", "tool changes", "signals"):
         table.add_column(column)
     for number, run in enumerate(runs, start=1):

@@ -25,6 +25,7 @@ _SLOPPY = {
     "sloppy_sequence": "messages came with a wrong sequence number",
     "sloppy_aliases": "aliases stood for a metric of a node and one of its device (as Tahu Java gives them)",
 }
+NAMED_MAX = 8
 COME_AND_GO = (VALIDATION_NODE,)  # nodes that tell what they have found, and end
 
 
@@ -74,6 +75,18 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
         host.stop()
 
 
+def counted_signals(measured: Mapping[str, Reading]) -> str:
+    """Return how many signals there are, how many are not good, and which: the first eight by name.
+
+    >>> fine = Reading("program", "O1", 1, Quality.GOOD, None, None, False)
+    >>> counted_signals({"program": fine, "alarm": fine._replace(value=None, quality=Quality.BAD)})
+    '2 signals, 1 not good: alarm'
+    """
+    bad = [name for name, reading in measured.items() if reading.quality is not Quality.GOOD]
+    named = f": {', '.join(bad[:NAMED_MAX])}{', …' if len(bad) > NAMED_MAX else ''}" if bad else ""
+    return f"{len(measured)} signals, {len(bad)} not good{named}"
+
+
 def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook) -> Report:
     """Return what a host application that has listened for a while can say; `first`: how nodes were when it began."""
     if not host.online:
@@ -90,9 +103,8 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
     if not host.nodes():
         findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
     for machine in machines(host):
-        bad = [name for name, reading in machine.measured.items() if reading.quality is not Quality.GOOD]
         state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
-        findings.append(Finding(machine.online, f"{machine.name}: {state}; {len(machine.measured)} signals, {len(bad)} not good"))
+        findings.append(Finding(machine.online, f"{machine.name}: {state}; {counted_signals(machine.measured)}"))
     described = described_machines(descriptions, [machine.name for machine in machines(host)])
     findings += [Finding(good, text) for one in described for good, text in sentences(one)]
     for ledger in stages:

@@ -98,7 +98,7 @@ class Awaited:
         if kind is _History.KEPT:
             return f"rows are held until {self.host} has them"
         return (
-            f"{self.host} has given no receipt for {silent_s / 60:.0f} min: {rows} rows wait for it, as many as [store] allows; "
-            f"start it, or, if it is no part of the plant any more, set await_receipt = false or clear the retained "
+            f"{self.host} has given no receipt for {silent_s / 60:.0f} min: {rows} rows wait for it, up to the limits of [store]"
+            f"; start it, or, if it is no part of the plant any more, set await_receipt = false or clear the retained "
             f"{state_topic(self.host)}"
         )

@@ -15,8 +15,8 @@ from edge.running.run import broker_addresses
 FILE = Path("vmc.toml")
 
 
-def test_an_empty_file_is_all_defaults() -> None:
-    config = parse("", FILE)
+def test_an_empty_table_is_all_defaults() -> None:
+    config = parse("[machine]", FILE)
     assert config == EdgeConfig(source=MtconnectConfig(), path=FILE)
     assert config.node == "edge-machine"
 
@@ -53,7 +53,15 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
         ("[signals.feed_mm_min]\ndeadband = -1", "vmc.toml: signals.feed_mm_min.deadband = -1: must be 0 or more"),
         ("[signals.feed_mm_min]\nscale = nan", "vmc.toml: signals.feed_mm_min.scale = nan: is not a finite number"),
         ("[tool_change]\nblock_pattern = '('", "vmc.toml: tool_change.block_pattern = '(': is no regular expression: missing )"),
-        ("[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, report, "),
+        ("", "vmc.toml: is empty; cnctwin edge discover ADDRESS > vmc.toml drafts it"),
+        ("# only a comment\n", "vmc.toml: is empty; "),
+        (
+            "[machine]\nname = 'mill'\n[focas]\nhost = '10.0.0.7'",
+            'vmc.toml: machine.adapter is missing; [focas] needs adapter = "focas" below [machine]',
+        ),
+        ("[opcua]", 'vmc.toml: machine.adapter is missing; [opcua] needs adapter = "opcua" below [machine]'),
+        ("[machine]\nadapter = 'focas'\n[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, "),
+        ("[mtconnect]\n[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, "),
         (
             "[broker]\nurl = 'mqtt://a'\nurls = ['mqtt://b']",
             "vmc.toml: broker: has url and urls; put all brokers into urls",

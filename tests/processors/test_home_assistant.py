@@ -76,6 +76,22 @@ def test_a_plc_address_that_is_a_flag_is_one_here_too_and_lists_of_alarms_are_no
     assert "alarms" not in found
 
 
+def test_what_is_chosen_by_address_is_announced_though_it_was_null_from_the_start() -> None:
+    engine = asked()
+    nulls = [
+        Reading(name, None, T0_MS, Quality.BAD, unit, "BadNodeIdUnknown", False)
+        for name, unit in (("plc_spindle_oil", "bar"), ("variable_offset", None), ("plc_door_open", None))
+    ]
+    found = shown(fed(engine, event(EventKind.BIRTH, 0.0, *nulls)))
+    assert {name: one["platform"] for name, one in found.items()} == dict.fromkeys(
+        ("plc_spindle_oil", "variable_offset", "plc_door_open"), "sensor"
+    )
+    assert found["plc_spindle_oil"]["unit_of_measurement"] == "bar"
+    again = shown(fed(engine, birth(1.0, plc_spindle_oil=4.5, variable_offset=0.25, plc_door_open=True)))
+    assert again["plc_door_open"]["platform"] == "binary_sensor", "a birth shows that it is a flag"
+    assert again["variable_offset"]["state_class"] == "measurement"
+
+
 def test_every_signal_there_is_can_be_announced_though_it_is_null() -> None:
     found = shown(fed(asked(home_assistant_entities_max=500), event(EventKind.BIRTH, 0.0, *every_signal())))
     classes = {name: (one.get("device_class"), one.get("unit_of_measurement")) for name, one in found.items()}

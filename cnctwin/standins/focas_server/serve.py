@@ -6,7 +6,7 @@ from threading import Event
 from cnctwin.errors import UsageError
 from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.focas_server.server import FocasServer
-from cnctwin.standins.focas_server.shown import ControlDescription, coded
+from cnctwin.standins.focas_server.shown import PMC_SHOWN, ControlDescription, coded
 from cnctwin.standins.simulated_control.alarm import RaisedAlarm, with_alarms
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
@@ -40,9 +40,12 @@ def simulate_focas(
     if alarm_every_s is not None:
         day = with_alarms(day, RaisedAlarm(alarm_every_s, *ALARM))
     control = SimulatedControl(coded(day), speed=speed, clock_offset_s=clock_offset_s)
-    server = FocasServer(control, described(has_tool_number=tool_number), port=port)
+    description = described(has_tool_number=tool_number)
+    server = FocasServer(control, description, port=port)
     with server:
-        print(f"{server.url} shows a FANUC control, which runs {PROGRAM.name}; Ctrl-C ends it", flush=True)
+        print(f"{server.url} shows a FANUC control, which runs {PROGRAM.name}; Ctrl-C ends it")
+        macros = ", ".join(f"#{number}" for number in description.macros)
+        print(f"addresses that tell something: variables {macros}; PMC {', '.join(PMC_SHOWN)}", flush=True)
         while not stop.wait(STATE_S):
             _keep(state_file, server, control)
         _keep(state_file, server, control)

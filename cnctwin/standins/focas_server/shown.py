@@ -25,6 +25,7 @@ CHANGE_RELAY = 100
 """The byte R whose bit 0 says that a tool change is in progress, as a machine builder's ladder would have it."""
 SPINDLE_TOOL = 100
 """The word D with the number of the tool in the spindle (0 = none), likewise."""
+PMC_SHOWN = (f"R{CHANGE_RELAY}.0", f"D{SPINDLE_TOOL}:2")
 
 
 @dataclass(frozen=True, slots=True)

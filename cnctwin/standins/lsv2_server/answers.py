@@ -94,6 +94,7 @@ def error(code: int) -> bytes:
 class Answers:
     """A simulated control as this model.
 
+    plc_password: of its log-in PLCDEBUG; None: any is right
     has_dnc: False where the option is missing without which nobody may log in as DNC; trace: signals of the axes, for the
     oscilloscope; scope_password: of its log-in OSZI; packets_lost: numbers of packets that never leave
     """
@@ -104,7 +105,7 @@ class Answers:
         model: Model = Model.TNC640,
         *,
         has_dnc: bool = True,
-        plc_password: str = "",
+        plc_password: str | None = None,
         trace: ServoTrace | None = None,
         scope_password: str = "",
     ) -> None:
@@ -157,7 +158,7 @@ class Answers:
             return encode("T_OK")
         if name not in _LOGINS or (name == "DNC" and not self.has_dnc):
             return error(Code.NO_LOGIN)
-        if name == "PLCDEBUG" and password != self.plc_password:
+        if name == "PLCDEBUG" and self.plc_password not in (None, password):
             return error(Code.NO_LOGIN)
         session.logins.add(name)
         return encode("T_OK")

@@ -7,6 +7,7 @@ from threading import Event
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.files.output import write
 from cnctwin.processes.state_file import STATE_S, keep
+from cnctwin.standins.lsv2_server import plc_memory
 from cnctwin.standins.lsv2_server.answers import Model
 from cnctwin.standins.lsv2_server.oscilloscope import ServoTrace
 from cnctwin.standins.lsv2_server.server import Lsv2Server
@@ -55,7 +56,8 @@ def simulate_lsv2(
         raise ApplicationError(f"port {port} cannot be used: {error.strerror}; give another with --port") from error
     try:
         shows = "which runs O1701.H" if trace is None else "which runs O1701.H and shows X, Y and Z on its oscilloscope"
-        print(f"{server.url} stands in for a control {server.answers.model}, {shows}; Ctrl-C ends it", flush=True)
+        print(f"{server.url} stands in for a control {server.answers.model}, {shows}; Ctrl-C ends it")
+        print(f"PLC addresses that tell something: {', '.join(plc_memory.SHOWN)}; any PLC password is right", flush=True)
         while not stop.wait(STATE_S):
             keep(state_file, _state(server))
         keep(state_file, _state(server))

@@ -47,7 +47,7 @@ class Lsv2Server:
         model: Model = Model.TNC640,
         port: int = 0,
         has_dnc: bool = True,
-        plc_password: str = "",
+        plc_password: str | None = None,
         trace: ServoTrace | None = None,
         scope_password: str = "",
         pause: Callable[[float], None] = time.sleep,

@@ -7,6 +7,7 @@ from threading import Event
 
 from cnctwin.errors import ApplicationError
 from cnctwin.processes.state_file import STATE_S, keep
+from cnctwin.standins.opcua_server.shown import ADDRESSES
 from cnctwin.standins.simulated_control.alarm import RaisedAlarm, with_alarms
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
@@ -44,7 +45,8 @@ def simulate_opcua(
     control = SimulatedControl(day, speed=speed, clock_offset_s=clock_offset_s)
     with OpcUaServer(control, state_dir() / "simulated-opcua", port=port, open_too=is_open) as server:
         discover = f"cnctwin edge discover '{server.url}?server_fingerprint={server.fingerprint}'"
-        print(f"{server.url} serves a simulated control; Ctrl-C ends it\nto draft a configuration: {discover}", flush=True)
+        print(f"{server.url} serves a simulated control; Ctrl-C ends it\nto draft a configuration: {discover}")
+        print(f"addresses that tell something: {', '.join(ADDRESSES)}", flush=True)
         while not stop.wait(STATE_S) and server.error is None:
             server.set_alarms(*alarms_of(control.now()))
             keep(state_file, {"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes})

@@ -14,6 +14,7 @@ CNC = "http://opcfoundation.org/UA/CNC"
 MACHINE_TOOL = "http://opcfoundation.org/UA/MachineTool/"
 MODELS = {"sinumerik": SINUMERIK, "cnc_40502": CNC, "machinetool_40501": MACHINE_TOOL}
 TOOLS = (1, 2, 3, 4, 5)
+ADDRESSES = ("R10", "DB100.DBW2", "M5.0")  # what a configuration may choose besides what a map reads
 Value = str | int | float | bool | list[str]
 
 

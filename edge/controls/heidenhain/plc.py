@@ -36,11 +36,14 @@ class PlcAddress(NamedTuple):
         """
         found = _ADDRESS.fullmatch(text)
         if found is None:
-            raise ConfigError(f"{text!r} is no PLC address; it may be M4000, B1000, W1000, D1004, S2, I3, O5, IW, ID, OW, OD")
+            raise ConfigError(
+                f"{text!r} is no PLC address; write M4000, B1000, W1000, D1004, S2, I3, O5, IW10, ID12, OW10 or OD12"
+            )
         address = cls(found[1], int(found[2]))
         size = _BYTES.get(address.kind, 1)
         if address.number % size:
-            raise ConfigError(f"{text!r} lies across two; the number of a {address.kind} is a multiple of {size}")
+            below = address.number - address.number % size
+            raise ConfigError(f"{text!r}: the number of a {address.kind} is a multiple of {size}, such as {address.kind}{below}")
         return address
 
     def __str__(self) -> str:

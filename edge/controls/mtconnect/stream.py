@@ -38,7 +38,7 @@ class Stream:
         tls: ssl.SSLContext | None = None,
     ) -> None:
         self._http = h11.Connection(h11.CLIENT, max_incomplete_event_size=HEAD_BYTES_MAX)
-        self._is_over = False
+        self._is_over = self._is_answered = False
         self.socket = socket.create_connection((url.hostname or "", url.port or (80 if tls is None else 443)), timeout_s)
         try:
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -104,6 +104,7 @@ class Stream:
         while True:
             event = self._event()
             if isinstance(event, h11.Response):
+                self._is_answered = True
                 return event
             if event is h11.NEED_DATA:
                 if (left_s := deadline_s - time.monotonic()) <= 0:
@@ -130,13 +131,18 @@ class Stream:
         try:
             return self._http.next_event()
         except h11.RemoteProtocolError as error:
-            raise ConnectionLostError(f"no HTTP: {error}") from error
+            raise self._not_http(error) from error
 
     def _receive(self, data: bytes) -> None:
         try:
             self._http.receive_data(data)
         except h11.RemoteProtocolError as error:
-            raise ConnectionLostError(f"no HTTP: {error}") from error
+            raise self._not_http(error) from error
+
+    def _not_http(self, error: h11.RemoteProtocolError) -> ConnectionLostError:
+        if self._is_answered:
+            return ConnectionLostError(f"the answer is no whole HTTP message: {error}")
+        return ConnectionLostError("what answers there is not HTTP; is it the agent's port?")
 
     def _sent(self, event: h11.Request | h11.EndOfMessage) -> bytes:
         return self._http.send(event) or b""

@@ -162,13 +162,14 @@ def _untrusted(url: str, der: bytes, certificate: x509.Certificate, folder: Path
     kept = folder / "refused" / f"{found}.der"
     name = certificate.subject.rfc4514_string()[:80]
     first = f"{url}: the server's certificate ({name}, SHA-256 {found}) is not trusted yet; compare it with the control's, then "
+    pin = f"set opcua.server_fingerprint to it (without a file yet: cnctwin edge discover '{url}?server_fingerprint={found}')"
     try:
         kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         if sum(1 for _ in kept.parent.iterdir()) < TRUSTED_FILES_MAX:
             _replace(kept, der)
     except OSError:
-        return first + f'set opcua.server_fingerprint = "{found}"'
-    return first + f"set opcua.server_fingerprint to it, or: mkdir -p {folder}/trusted && mv {kept} {folder}/trusted/"
+        return f"{first}{pin}"
+    return first + f"{pin}, or: mkdir -p {folder}/trusted && mv {kept} {folder}/trusted/"
 
 
 def _trusted(folder: Path) -> set[str]:

@@ -30,6 +30,7 @@ from sparkplug.quality import Quality
 
 MEANINGS_MAX = 4096
 ALARM = "alarm"
+NOT_MONITORED = "limit 0: not monitored at the control"
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,6 +272,8 @@ def _sample(meaning: Meaning, fact: Fact, sweep: Sweep) -> EdgeSample:
     at_ms = sweep.t_ms if fact.t_ms is None else fact.t_ms
     why = fact.fault or meaning.fault
     value, quality, reason = bad(why) if why else read_value(meaning.target, _worded(meaning, fact))
+    if reason == EMPTY and fact.value == 0 and meaning.target.signal.startswith("tool_life_limit"):
+        reason = NOT_MONITORED
     return EdgeSample(meaning.target.signal, value, at_ms, quality, reason, sweep.number)
 
 

@@ -69,5 +69,5 @@ def test_what_a_log_said_holds_in_the_log_that_follows(tmp_path: Path) -> None:
         assert np.array_equal(joined[name], values, equal_nan=True), name
     done = imported(tmp_path / "a.txt", tmp_path / "b.txt", "--devices", DEVICES, "--out", tmp_path / "run.csv")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "1 stretches in a.txt, b.txt" in done.stdout
+    assert "1 stretch in a.txt, b.txt" in done.stdout
     assert len(read_run(tmp_path / "run.csv")) == len(whole)

@@ -13,6 +13,7 @@ from cnctwin.cli import main
 from cnctwin.plant.doctor import (
     Finding,
     Report,
+    counted_signals,
     examine,
     of_awaited,
     of_edge_store,
@@ -91,6 +92,13 @@ def test_a_healthy_plant_has_no_bad_finding_and_counted_holes_are_told(mosquitto
     assert "edge-vmc: 10 = 7 emitted + 2 dropped + 1 buffered" in told
     assert "vmc: its control is connected; 1 signals, 0 not good" in told
     assert "3 holes so far, counted" in told
+
+
+def test_signals_that_are_not_good_are_named() -> None:
+    readings = [Reading(f"s{at}", at, 1, Quality.BAD if at else Quality.GOOD, None, None, False) for at in range(11)]
+    assert counted_signals({one.name: one for one in readings[:3]}) == "3 signals, 2 not good: s1, s2"
+    told = "11 signals, 10 not good: s1, s2, s3, s4, s5, s6, s7, s8, …"
+    assert counted_signals({one.name: one for one in readings}) == told
 
 
 @pytest.mark.parametrize("wrong", [{"emitted": 6}, {"dropped/unmapped": 1}])

@@ -344,6 +344,14 @@ def test_a_malformed_request_is_refused_in_one_line_that_names_it(server: Server
     assert "\n" not in said
 
 
+def test_a_body_without_its_type_is_told_what_to_send(server: Server) -> None:
+    answer = server.client.post(
+        f"{PREFIX}/objects/value", headers={"Authorization": f"Bearer {TOKEN}"}, content=b'{"elementIds": ["plant"]}'
+    )
+    said = "the body is not taken as JSON; send Content-Type: application/json"
+    assert failed(answer.json(), 400) == said
+
+
 def test_no_more_ids_than_the_limit_are_taken_at_once(server: Server) -> None:
     assert "elementIds" in failed(server.post("/objects/value", 400, elementIds=["plant"] * 1001), 400)
     headers = {"Authorization": f"Bearer {TOKEN}"}

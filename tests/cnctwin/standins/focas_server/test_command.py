@@ -38,7 +38,8 @@ def test_it_serves_a_working_day_with_a_clock_that_is_wrong_and_tells_its_counts
         thread.join()
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == f"focas://127.0.0.1:{port} shows a FANUC control, which runs base_plate.nc; Ctrl-C ends it"
-    assert lines[1].startswith("connections 1, frames 2, asked 4, answered 3, refused 1")
+    assert lines[1] == "addresses that tell something: variables #500, #501; PMC R100.0, D100:2"
+    assert lines[2].startswith("connections 1, frames 2, asked 4, answered 3, refused 1")
     assert json.loads(file.read_text())["ledger"]["answered"] == 3
 
 

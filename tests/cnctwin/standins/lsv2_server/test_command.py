@@ -30,6 +30,8 @@ def test_it_serves_until_it_is_stopped_and_says_where(tmp_path: Path, capsys: py
     assert not thread.is_alive()
     out = capsys.readouterr().out
     assert out.startswith("lsv2://127.0.0.1:")
+    told = "PLC addresses that tell something: M4000, M4001, W1000, D1004, W1008, D1012, W1016, S0; any PLC password is right"
+    assert told in out
     assert "writes refused 0" in out
     assert json.loads(state.read_text())["telegrams"] > 5
 

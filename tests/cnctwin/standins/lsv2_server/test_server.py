@@ -5,6 +5,7 @@ import struct
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cnctwin.standins.lsv2_server import plc_memory
 from cnctwin.standins.lsv2_server.answers import Answers, Model, Session
 from cnctwin.standins.lsv2_server.server import CLIENTS_MAX, Fault, Lsv2Server
 from cnctwin.standins.lsv2_server.telegram import PAYLOAD_BYTES_MAX, Telegram, TelegramError, TelegramReader, encode
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import ControlState
+from edge.controls.heidenhain.plc import PlcAddress
 
 SWITCHED_ON_S = 1_772_438_400.0
 STATE = ControlState(
@@ -117,6 +120,25 @@ def test_every_write_is_refused_and_counted(tmp_path: Path) -> None:
         for number, write in enumerate(writes, 1):
             assert write() is False
             assert server.answers.counters.writes_refused == number
+
+
+@pytest.mark.parametrize("password", [b"", b"807667\x00", b"secret\x00"])
+def test_a_control_without_a_plc_password_takes_any(password: bytes) -> None:
+    session = Session()
+    assert Answers(control()).answer(session, Telegram("A_LG", b"PLCDEBUG\x00" + password)) == encode("T_OK")
+    assert session.logins == {"PLCDEBUG"}
+
+
+def test_the_addresses_that_are_told_at_the_start_are_those_that_tell_something() -> None:
+    shown = replace(STATE, is_changing_tool=True, coolant_on=True, spindle_load_pct=20.0, feed_mm_min=900.0, spindle_temp_c=31.0)
+    with connected() as (client, server):
+        server.control = server.answers.control = SimulatedControl([shown], machine_s=lambda: 10.0)
+        for address in map(PlcAddress.parse, plc_memory.SHOWN):
+            at = address.lies_at(client.parameters)
+            assert at is not None
+            read = plc_memory.read(shown, *at)
+            assert read is not None
+            assert address.value(read), str(address)
 
 
 def test_without_its_log_in_nothing_is_told_and_some_log_ins_are_refused() -> None:

@@ -18,8 +18,10 @@ from asyncua.client.client import Client
 
 from cnctwin.errors import ApplicationError
 from cnctwin.standins.opcua_server.serve import simulate_opcua
-from cnctwin.standins.opcua_server.shown import MODELS, TOOLS, shown
+from cnctwin.standins.opcua_server.shown import ADDRESSES, MODELS, TOOLS, shown
 from cnctwin.standins.simulated_control.state import ControlState
+from edge.chosen import Chosen
+from edge.controls.opcua.address import node_of_address
 from edge.controls.opcua.point import maps
 
 TOOL = "/Channel/State/actTNumber[u1,1]"
@@ -93,7 +95,8 @@ def test_who_writes_or_calls_is_counted(state: Path) -> None:
 def test_what_is_shown_is_what_the_maps_read() -> None:
     served = {one.identifier for one in shown() if one.identifier}
     names = {point.node_for(tool).partition(";s=")[2] for point in maps()["sinumerik"].points for tool in TOOLS}
-    by_address = {"/Channel/Parameter/R[u1,10]", "/Plc/DB100.DBW2", "/Plc/M5.0"}  # what a configuration may choose besides
+    chosen = (Chosen("chosen", text, is_plc=text != "R10") for text in ADDRESSES)
+    by_address = {node_of_address(one).partition(";s=")[2] for one in chosen}
     assert served == names | by_address
     assert {name: known.namespace for name, known in maps().items()} == MODELS
 

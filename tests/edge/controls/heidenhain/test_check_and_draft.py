@@ -146,7 +146,7 @@ def test_messages_of_an_itnc_are_a_text_and_a_list() -> None:
     [
         ('[variables]\nq = { address = "Q10" }', "variables.q.address: 'Q10' is a Q parameter, which LSV2 does not tell"),
         ('[plc]\nx = { address = "S1" }', "plc.x.address: 'S1' is a string"),
-        ('[plc]\nx = { address = "W1001" }', "'W1001' lies across two"),
+        ('[plc]\nx = { address = "W1001" }', "'W1001': the number of a W is a multiple of 2, such as W1000"),
         ('[heidenhain]\ntool_table = "tool.t"', "heidenhain.tool_table"),
     ],
 )

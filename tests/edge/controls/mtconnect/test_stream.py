@@ -95,6 +95,14 @@ def test_a_head_that_does_not_come_is_given_up() -> None:
         opened(url)
 
 
+def test_another_service_on_the_port_is_named_as_such() -> None:
+    with (
+        agent(b"SSH-2.0-OpenSSH_9.2\r\n\r\n") as url,
+        pytest.raises(ConnectionLostError, match="what answers there is not HTTP"),
+    ):
+        opened(url)
+
+
 @pytest.mark.parametrize("answer", [b"", b"SSH-2.0-OpenSSH_9.2\r\n\r\n", HEAD + b"x" * 200_000])
 def test_whoever_speaks_no_http_is_a_lost_connection(answer: bytes) -> None:
     with agent(answer) as url, pytest.raises((ConnectionLostError, ConnectionResetError)):
@@ -106,5 +114,5 @@ def test_whoever_speaks_no_http_is_a_lost_connection(answer: bytes) -> None:
     [b"Content-Length: 70\r\n\r\none", b"Transfer-Encoding: chunked\r\n\r\n30\r\none", b"Transfer-Encoding: chunked\r\n\r\nzz"],
 )
 def test_a_body_that_is_torn_is_a_lost_connection(torn: bytes) -> None:
-    with agent(HEAD + torn) as url, opened(url) as stream, pytest.raises(ConnectionLostError, match="no HTTP"):
+    with agent(HEAD + torn) as url, opened(url) as stream, pytest.raises(ConnectionLostError, match="is no whole HTTP message"):
         body_of(stream)

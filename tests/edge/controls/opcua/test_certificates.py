@@ -45,7 +45,7 @@ def test_a_server_that_nobody_vouched_for_is_refused_in_one_line_that_says_how_t
         check_trust(URL, der, "", tmp_path)
     text = str(refused.value)
     assert "\n" not in text
-    assert fingerprint(der) in text
+    assert f"cnctwin edge discover '{URL}?server_fingerprint={fingerprint(der)}'" in text
     trusted = tmp_path / "trusted"
     trusted.mkdir()
     (tmp_path / "refused" / f"{fingerprint(der)}.der").rename(trusted / "mill.der")

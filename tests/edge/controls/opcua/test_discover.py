@@ -67,6 +67,7 @@ def test_a_drafted_configuration_loads_and_shows_the_control_in_true_units(bench
     assert "# It follows OPC 40501-1, machine tools: 9 of 9 signals" in text
     config = parse(text.replace("[opcua]", f'[opcua]\ncertificate_folder = "{bench.folder}/edge"'), tmp_path / "mill.toml")
     assert config.machine.name == 'M"1'
+    assert '[broker]\nurl = "mqtt://127.0.0.1:1883"\n' in text, "as in the drafts of the other controls"
     assert config.source.map == "sinumerik", "what a control calls its own is more than a model that it follows besides"
     assert config.source.server_fingerprint == bench.server.fingerprint
     assert {row.signal: row.value for row in describe(config)}["feed_mm_min"] == 1500.0

@@ -43,7 +43,7 @@ def test_geometry_wear_and_life_are_those_of_the_tool_in_the_spindle_and_follow_
         fifth = reader.until(lambda one: any(s.signal == "tool_length_mm" and s.value == 150.0 for s in one.samples))
         assert all(s.timestamp_ms > changed_ms for s in fifth.samples if s.signal.startswith("tool_l"))
         life = {s.signal: s.reason for s in fifth.samples if s.signal.startswith("tool_life")}
-        assert life["tool_life_limit_min"] == "empty", "its life is not monitored"
+        assert life["tool_life_limit_min"] == "limit 0: not monitored at the control"
         assert life["tool_life_used_min"] == "the control tells what is left, 0, and no limit"
 
 
