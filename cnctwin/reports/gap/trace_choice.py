@@ -1,6 +1,7 @@
 """The choice of signals that are worth a look, and of the part of the run where the gap is seen best."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ TRACES_MAX = 4
 STANDS_OUT = 1.2
 SLOW_S = 0.1
 """A signal that is sampled more slowly than this is looked at over the whole run."""
+HOLE = 2.5
+"""Usual spacings of a signal's samples beyond which one is missing."""
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +61,22 @@ def chosen(traces: Sequence[Trace]) -> tuple[Trace, ...]:
         if not place or trace is most_left or over_floor(trace) > max(STANDS_OUT, largest / 10.0 if place > 1 else 0.0)
     ]
     return tuple(shown[:TRACES_MAX])
+
+
+def at_own_samples(trace: Trace) -> Trace:
+    """Return the trace at the samples of its signal, where that is sampled more slowly than its run.
+
+    Of the rows between them, which hold nothing of the signal, the first one stays where more than `HOLE` usual spacings are
+    without a sample, and the ends of the run stay: a line is broken at a hole, and nowhere else.
+    """
+    there = np.flatnonzero(np.isfinite(trace.measured))
+    if len(there) < 2 or np.median(np.diff(there)) < 2:
+        return trace
+    spacing_s = np.diff(trace.t_s[there])
+    holes = there[:-1][spacing_s > HOLE * np.median(spacing_s)] + 1
+    kept = np.unique(np.concatenate([there, holes, [0, len(trace.t_s) - 1]]))
+    names = ("t_s", "measured", "before", "after", "floor", "regime")
+    return replace(trace, **{name: getattr(trace, name)[kept] for name in names})
 
 
 def _rank(trace: Trace) -> tuple[bool, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from cnctwin.reports.gap.chart import Frame, anchor, band, frame_of, panel, path, plot, x_axis
 from cnctwin.reports.gap.markup import Markup, joined, section, tag
 from cnctwin.reports.gap.signal_name import gap_unit, is_position, regime_name, signal_name
-from cnctwin.reports.gap.trace_choice import changed, chosen, over_floor, window_s
+from cnctwin.reports.gap.trace_choice import at_own_samples, changed, chosen, over_floor, window_s
 from cnctwin.reports.gap.trace_data import as_script, packed, rows_max, thinned
 from cnctwin.reports.gap.written import times
 from twin.gap.diagnosis import Diagnosed, Trace
@@ -34,7 +34,7 @@ _TOOLS = (
 
 def traces(diagnosed: Diagnosed) -> Markup:
     """The section, with the samples that its script draws."""
-    picked = chosen(diagnosed.traces)
+    picked = [at_own_samples(trace) for trace in chosen(diagnosed.traces)]
     if not picked:
         return section("traces", "Measured against twin", "No recording came with this diagnosis to be looked at.")
     left_out = len({trace.signal for trace in diagnosed.traces}) - len(picked)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cnctwin.reports.gap.chart import envelope, frame_of, path, ticks
 from cnctwin.reports.gap.page import report_html
-from cnctwin.reports.gap.trace_choice import TRACES_MAX, chosen, window_s
+from cnctwin.reports.gap.trace_choice import TRACES_MAX, at_own_samples, chosen, window_s
 from cnctwin.reports.gap.trace_data import BYTES_MAX, MISSING, as_script, packed, rows_max, thinned
 from tests.cnctwin.reports.gap.diagnosed import explained, traces, unknown, warming
 from tests.cnctwin.reports.gap.page_reader import PageReader
@@ -75,6 +75,35 @@ def test_a_single_spike_does_not_decide_the_window() -> None:
 def test_slow_and_short_recordings_are_looked_at_whole() -> None:
     assert window_s(warming().traces[0]) == (0.0, 7919.0)
     assert window_s(trace(np.ones(300))) == (0.0, 0.299)
+
+
+def slow_meter(*, without: slice = slice(0)) -> Trace:
+    """A meter that has a value at every hundredth row of ten seconds; `without` are rows without any."""
+    given = trace(np.where(np.arange(10_000) % 100 == 50, 3.0, np.nan), signal="spindle_load_pct")
+    given.before[without] = np.nan
+    return replace(given, measured=given.before - 1.0, floor=np.where(np.isfinite(given.before), 1.0, np.nan))
+
+
+def test_a_meter_that_is_slower_than_its_run_is_one_line_over_the_whole_run() -> None:
+    given = at_own_samples(slow_meter())
+    assert window_s(given) == (0.0, 9.999)
+    page = PageReader(report_html(replace(explained(), traces=(slow_meter(),)), "machine"))
+    for line in page.of("path", data_series="before"):
+        assert line["d"].count("M") == 1 and len(line["d"].split("M")[1].split()) == 2 * 100
+    assert json.loads(next(s for s in page.scripts if s.startswith("[")))[0]["n"] == 102
+
+
+def test_a_hole_in_the_samples_of_a_slow_meter_breaks_its_line() -> None:
+    given = at_own_samples(slow_meter(without=slice(4000, 4400)))
+    x, y = given.t_s, given.before
+    assert path(frame_of(x, [y], 100), x, y).count("M") == 2
+
+
+def test_a_signal_at_every_row_of_its_run_stays_as_it_is() -> None:
+    gap = np.ones(1000)
+    gap[300:600] = np.nan
+    given = trace(gap)
+    assert at_own_samples(replace(given, measured=gap)).t_s is given.t_s
 
 
 def test_samples_come_back_as_they_were() -> None:
