@@ -7,7 +7,7 @@ import time
 from playwright.sync_api import Browser, expect
 
 from tests.cnctwin.page.conftest import SIZES, VIEWS, WAIT_MS_MAX, Visit, expect_drawn
-from tests.cnctwin.page.documents import CHANGED, FAULTY, alerts, job
+from tests.cnctwin.page.documents import CHANGED, FAULTY, alert, alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import SignalValue
 
@@ -165,6 +165,24 @@ def test_an_alert_is_acknowledged_with_name_and_comment(visit: Visit, shop: Shop
     ((path, body),) = shop.posted
     assert path.endswith("/acknowledge")
     assert body == {"by": "ada", "comment": "on my way", "episode": body["episode"]}
+
+
+def test_the_head_of_a_machine_names_its_worst_alert_that_nobody_has_acknowledged(visit: Visit, shop: Shop) -> None:
+    told = alerts(list(shop.numbers))
+    told["alerts"] = [
+        alert("vmc", "gap_growing", "high", "acknowledged", 5400, acknowledged_by="ada"),
+        alert("vmc", "score_drift", "low", "firing", 9),
+        alert("vmc", "machine_offline", "medium", "firing", 120, sentence="No data from the machine"),
+        alert("mill-01", "rule_vibration", "high", "firing", 9),
+    ]
+    shop.answers["/alerts"] = lambda _path, _body: (200, told)
+    page = visit.open("#/machine/vmc")
+    pill = page.locator('.machine-head a[href="#/alerts"]')
+    expect(pill).to_contain_text("alert firing: Machine offline")
+    expect(pill).to_have_attribute("title", "No data from the machine")
+    told["alerts"] = [told["alerts"][0]]
+    page.reload()
+    expect(pill).to_contain_text("alert acknowledged: Gap growing")
 
 
 def test_a_refused_acknowledgement_says_why(visit: Visit, shop: Shop) -> None:

@@ -3,7 +3,14 @@
 import { el, setClass, setHidden, setSymbol, setText, symbol } from "../dom.js";
 import { SUPPRESSION_MEANS, age, execution, moment } from "../text.js";
 import { serverNow } from "../clock.js";
+import { alertName, sentence, worstFirst } from "./alerts.js";
 import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
+
+/** The worst alert of a machine that stands. Its own signal tells it only while it is online, and not that it is gone. */
+function worstAlert(app, machine) {
+  const listed = app.alerts?.available === false ? [] : (app.alerts?.alerts ?? []);
+  return listed.filter((one) => one.labels?.machine === machine.name && one.phase !== "resolved").sort(worstFirst)[0];
+}
 
 export function machineHead(app, machine, viewName, ...after) {
   const select = el("select", {
@@ -73,13 +80,15 @@ export function machineHead(app, machine, viewName, ...after) {
     setText(block, machine.bare("nc_block") === null ? "" : String(machine.bare("nc_block")));
     setHidden(block, !block.textContent);
     setHidden(gate, machine.bare(TOOL_CHANGE_GATE) !== true);
-    const phase = machine.bare(ALERT_STATE),
+    const worst = worstAlert(app, machine),
+      phase = worst ? worst.phase : machine.bare(ALERT_STATE),
       alarm = machine.value("alarm")?.quality === "good" ? machine.bare("alarm") : null;
     setHidden(alert, (!phase || phase === "none") && !alarm);
     setSymbol(alertSign, { acknowledged: "s-ack", pending: "s-pending" }[phase] ?? "s-alert");
+    alert.title = worst ? sentence(worst) : "";
     setText(
       alertWord,
-      [phase && phase !== "none" ? `alert ${phase}` : "", alarm ? `control: ${alarm}` : ""].filter(Boolean).join(" · "),
+      [phase && phase !== "none" ? `alert ${phase}${worst ? `: ${alertName(worst)}` : ""}` : "", alarm ? `control: ${alarm}` : ""].filter(Boolean).join(" · "),
     );
     setClass(element, "is-offline", !machine.online);
   }
