@@ -179,7 +179,7 @@ def day(
     offers = tuple(Offer(name, "recorded") for name in dict.fromkeys(s.signal for row in rows for s in row))
     told = {sample.signal: sample for sample in rows[0]}
     plant = Plant(at_ms)
-    plant.born(device_metrics(offers, told), at_ms)
+    plant.born(device_metrics(offers, told, at_ms), at_ms)
     for row in rows[1:]:
         before_ms, at_ms = at_ms, max(at_ms, *(sample.timestamp_ms for sample in row))
         if at_ms - before_ms > 2000 * SILENCE_S:
