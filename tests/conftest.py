@@ -32,6 +32,10 @@ if not IS_FULL:
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parents[1] / ".cache" / "bytecode"))
 
+# xdist gives its workers the size of a terminal: tables would be cut in a run with workers and not in one without.
+for name in ("COLUMNS", "LINES"):
+    os.environ.pop(name, None)
+
 # The workers have all cores. Where each solves its small systems with a thread for each core as well, they wait for each other:
 # tests/twin/identification/test_identify.py then takes 16 s of processor time in place of 11. numpy reads this when it is first
 # imported, which is later.
