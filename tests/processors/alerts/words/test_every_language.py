@@ -12,7 +12,7 @@ from processors.alerts.facts import Facts, facts_of, of_score
 from processors.alerts.lag import facts_of as lag_facts
 from processors.alerts.phases import NOT_OFFERED
 from processors.alerts.state import Alert, Phase, Severity
-from processors.alerts.watch import OFFLINE
+from processors.alerts.watch import NOT_HEARD, OFFLINE
 from processors.alerts.words import language as words_folder
 from processors.alerts.words.language import SUFFIX, shipped
 from processors.alerts.words.wording import Occasion, wording
@@ -247,7 +247,7 @@ def test_every_file_names_all_signals_regimes_units_and_reasons_that_english_nam
     named = {signal for signal in SIGNALS if not signal.startswith("axis_")} | NUMBERS
     assert file["signals"].keys() >= named
     assert {regime for regimes in REGIMES.values() for regime in regimes} == file["regimes"].keys()
-    assert {OFFLINE, NOT_OFFERED} == file["reasons"].keys()
+    assert {OFFLINE, NOT_HEARD, NOT_OFFERED} == file["reasons"].keys()
 
 
 def test_every_alarm_is_tried_below() -> None:
