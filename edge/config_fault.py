@@ -1,4 +1,4 @@
-"""What is wrong with a configuration file, in one line: file, key, value, what is wrong, and the way out.
+"""One line about a fault in a configuration file: file, key, value, what is wrong, and the way out.
 
 Several complaints of one table: a key that does not exist comes first, since one that is missing is often the same, misspelt.
 """

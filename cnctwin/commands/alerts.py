@@ -37,7 +37,7 @@ Comment = Annotated[str, typer.Option(help="Why")]
 
 @alerts_app.command("list")
 def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False) -> None:
-    """What fires and what is over, in the words of its notification; silences and receivers.
+    """List what fires and what is over, in the words of its notification; silences and receivers.
 
     Exit code 1: something fires that nobody has acknowledged.
     """

@@ -51,7 +51,7 @@ class Row:
 
 
 class Rows:
-    """What is known of one machine; each message of it makes a row, from the birth of its own edge on.
+    """The last values of one machine; each of its messages makes a row, from the birth of its own edge on.
 
     Before that only its twin may have been heard, and a row would lack what the control reports. Older values that a sender
     delivers late make none.

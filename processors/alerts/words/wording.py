@@ -66,7 +66,7 @@ class Occasion(NamedTuple):
 
 
 class _Said(NamedTuple):
-    """What is said of an alert, whatever the occasion."""
+    """The texts of an alert that do not depend on the occasion."""
 
     alert: Alert
     flapping: Flapping | None

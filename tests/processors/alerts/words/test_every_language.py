@@ -226,7 +226,7 @@ TOLD: list[tuple[str, Facts, tuple[str, str], tuple[str, str]]] = [
 
 
 def own(name: str) -> dict[str, Any]:
-    """What the file of a language holds itself; what it leaves out would be taken from English."""
+    """Return the tables that the file of a language holds itself; those that it leaves out would be taken from English."""
     folder = words_folder.files(words_folder.__package__)
     return tomllib.loads((folder / f"{name}{SUFFIX}").read_text(encoding="utf-8"))
 

@@ -8,7 +8,7 @@ from twin.programs.refusal import RefusedError
 from twin.programs.sinumerik.language.functions import Value, as_number
 
 NEWER: Final = ("_UMODE", "_FS", "_ZFS", "_GMODE", "_DMODE", "_AMODE")
-"""What the screens of Operate put behind the parameters of a milling cycle. _DMODE ends in the plane (`in_plane`)."""
+"""The modes that the screens of Operate put behind the parameters of a milling cycle. _DMODE ends in the plane (`in_plane`)."""
 OPERATE: Final = (
     "is a mode of Operate's screens that is not read; post this operation without the cycle, or call it as older controls do: "
     "the depth as a coordinate, widths in mm, and 0 here"
