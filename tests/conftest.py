@@ -65,7 +65,7 @@ LONG = (
     "cnctwin/standins/simulated_machine/test_machining.py",
     "benchmarks/test_benchmarks.py",
     "twin/anomaly/test_detector.py",
-    "cnctwin/commands/train/test_anomaly.py",
+    "cnctwin/commands/learn/train/test_anomaly.py",
     "processors/alerts/courier/test_simulated_crashes.py",
     "cnctwin/memory/test_historian_killed.py",
     "cnctwin/memory/store/influx/test_outage.py",

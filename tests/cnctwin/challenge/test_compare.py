@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from cnctwin.challenge import losses
 from cnctwin.challenge.contest import Losses, outcome
 from cnctwin.challenge.stretch import read_stretch, stretch_of_store
-from cnctwin.commands.model import model_app
+from cnctwin.commands.learn.model import model_app
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.models import golden, registry

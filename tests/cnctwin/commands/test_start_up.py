@@ -48,7 +48,7 @@ def test_the_entry_point_loads_no_command_before_it_is_asked_for() -> None:
 
 def test_the_commands_load_no_library_that_only_some_of_them_need() -> None:
     loaded = _modules_after(ALL_COMMANDS)
-    assert {"cnctwin.commands.gap", "cnctwin.commands.process", "typer"} <= loaded
+    assert {"cnctwin.commands.twin.gap", "cnctwin.commands.run.process", "typer"} <= loaded
     assert loaded & set(HEAVY) == set()
     services = {
         "cnctwin.api.server",

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.commands.store import import_command, moment_ms, store_app
+from cnctwin.commands.keep.store import import_command, moment_ms, store_app
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.embedded import EmbeddedStore
 from cnctwin.memory.store.opening import open_store

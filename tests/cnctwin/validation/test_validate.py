@@ -10,7 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cnctwin.commands.validate import validate
+from cnctwin.commands.twin.validate import validate
 from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.standins.simulated_machine.description import PROCESSORS, TOLD

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cnctwin.commands.train.residual import train_residual
+from cnctwin.commands.learn.train.residual import train_residual
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.commands.train.app import train_app
+from cnctwin.commands.learn.train.app import train_app
 from cnctwin.errors import UsageError
 from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSettings, calibrated_cell
 from cnctwin.training.anomaly.recorded_cell import part, recorded_cell

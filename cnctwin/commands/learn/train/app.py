@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from cnctwin.commands.train.detector import train_detector
-from cnctwin.commands.train.residual import train_residual
+from cnctwin.commands.learn.train.detector import train_detector
+from cnctwin.commands.learn.train.residual import train_residual
 from cnctwin.errors import UsageError
 
 train_app = typer.Typer(

@@ -86,7 +86,7 @@ def _of_store(*values: object) -> list[tuple[str, object]]:
 def _from_runs(runs: list[Path], machine_file: Path | None, out: Path, said: dict[str, list[str]]) -> "Composed":
     """Compose a case from run logs, asking on a terminal for what no option says."""
     with needed_by("a case", "twin"):
-        from cnctwin.commands.gap_case_runs import machine_file_of, recordings_of
+        from cnctwin.commands.twin.gap_case_runs import machine_file_of, recordings_of
         from cnctwin.composing.from_runs import compose_runs
 
     recordings = recordings_of(runs, said)

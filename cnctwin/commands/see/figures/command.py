@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from cnctwin.commands.figures.shown import show
 from cnctwin.commands.options import AsJson, StorePlace
+from cnctwin.commands.see.figures.shown import show
 from cnctwin.errors import UsageError
 from cnctwin.figures.comma_separated import to_csv
 from cnctwin.figures.documents import read_records

@@ -13,8 +13,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.gap_case import case
 from cnctwin.commands.options import AsJson
+from cnctwin.commands.twin.gap_case import case
 from cnctwin.errors import UsageError
 from cnctwin.processes.extras import needed_by
 from cnctwin.processes.stopping import stopped_by_signals

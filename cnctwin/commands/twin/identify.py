@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.table import Table
 
-from cnctwin.commands.gap_case import Ambient, From, Machine, MachineFile, To, composed_of
 from cnctwin.commands.options import AsJson
+from cnctwin.commands.twin.gap_case import Ambient, From, Machine, MachineFile, To, composed_of
 from cnctwin.errors import UsageError
 from cnctwin.files.output import write
 from cnctwin.processes.extras import needed_by
