@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, Device, Devices, From, To
 from cnctwin.errors import UsageError
 from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
-from cnctwin.terminal.moment import moment_ms
+from cnctwin.terminal.moment import stretch_ms
 from cnctwin.terminal.spinner import working
 
 
@@ -29,11 +29,11 @@ def import_recording(
         Path | None,
         typer.Option("--map", help="columns.toml: which column is what, in which unit; without it, one is drafted where needed"),
     ] = None,
-    devices: Annotated[Path | None, typer.Option(help="The Devices.xml of the SHDR log")] = None,
-    device: Annotated[str | None, typer.Option(help="Which device of it, where there are several")] = None,
-    machine: Annotated[str | None, typer.Option(help="Which machine of the store")] = None,
-    from_: Annotated[str | None, typer.Option("--from", help="Of the store: UTC, as 2026-11-21T06:00, or ms since 1970")] = None,
-    to: Annotated[str | None, typer.Option(help="Of the store")] = None,
+    devices: Devices = None,
+    device: Device = None,
+    machine: Annotated[str | None, typer.Option(help="Name of the machine, as the store has it")] = None,
+    from_: From = None,
+    to: To = None,
     as_json: AsJson = False,
 ) -> None:
     """Turn a recording into run logs: of files with columns one; else one for each program execution or stretch without a gap."""
@@ -56,13 +56,13 @@ def import_recording(
 
 
 def _from_store(recordings: Sequence[str], machine: str, from_: str | None, to: str | None, out: Path) -> None:
-    if from_ is None or to is None:
-        raise UsageError(f"--machine {machine}: say which stretch of the store with --from and --to")
+    if from_ is None:
+        raise UsageError(f"--machine {machine}: say which stretch of the store with --from, and --to where it is not until now")
     if len(recordings) > 1:
         raise UsageError(f"--machine {machine}: {recordings[1]} is one store too many; give one")
     with needed_by("a run log", "twin"):
         from cnctwin.memory.store.run_export import export
-    rows = export(recordings[0], machine, (moment_ms(from_, "--from"), moment_ms(to, "--to")), out)
+    rows = export(recordings[0], machine, stretch_ms(from_, to), out)
     standard_output().print(f"{out}: {rows} rows", markup=False, highlight=False)
 
 

@@ -32,7 +32,7 @@ def record(
         str | None,
         typer.Option(help="x_ref,x_pos,x_torque,… or the control's own names; without it they are listed"),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long", min=0.02, max=86_400.0)] = 10.0,
+    seconds: Annotated[float, typer.Option(help="How long to record, in seconds", min=0.02, max=86_400.0)] = 10.0,
     interval: Annotated[int, typer.Option(help="µs between two values: 600, 3000 or 21000")] = 3000,
     map_file: Annotated[
         Path | None, typer.Option("--map", help="columns.toml, for signals that have no column of their own")

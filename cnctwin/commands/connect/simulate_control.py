@@ -6,16 +6,15 @@ from typing import Annotated
 
 import typer
 
+from cnctwin.commands.options import Device, Devices, Speed, StateFile
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.standins.mtconnect_agent.serve import replay
 
 control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
 
-Speed = Annotated[float, typer.Option(help="How many times faster than real time")]
 HttpPort = Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)]
 TcpPort = Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)]
-ClockOffset = Annotated[float, typer.Option(help="How far the control's clock is ahead")]
-StateFile = Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)]
+ClockOffset = Annotated[float, typer.Option(help="Seconds by which the control's clock is ahead")]
 
 
 class HeidenhainModel(StrEnum):
@@ -28,16 +27,16 @@ class HeidenhainModel(StrEnum):
 @control_app.command("mtconnect")
 def simulate_mtconnect(
     recording: Annotated[Path, typer.Argument(help="SHDR log or time|key|value text")],
-    devices: Annotated[Path | None, typer.Option(help="Its Devices.xml; else a device model is drafted from its keys")] = None,
-    device: Annotated[str | None, typer.Option(help="Which device of the model the recording belongs to")] = None,
-    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
+    devices: Devices = None,
+    device: Device = None,
+    speed: Speed = 1.0,
     port: HttpPort = 0,
     style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Begin when the first client asks for samples")] = False,
     state_file: StateFile = None,
 ) -> None:
-    """Serve a recording as a real MTConnect agent serves its machine."""
+    """Serve a recording as a real MTConnect agent serves its machine; without --devices, the model is drafted from its keys."""
     with stopped_by_signals() as stop:
         replay(
             recording,
@@ -80,7 +79,7 @@ def simulate_focas(
     port: TcpPort = 8193,
     clock_offset_s: ClockOffset = 0.0,
     tool_number: Annotated[
-        bool, typer.Option("--tool-number", help="With the option that tells the tool in the spindle")
+        bool, typer.Option("--tool-number", help="With the option that reports the tool in the spindle")
     ] = False,
     state_file: StateFile = None,
 ) -> None:
@@ -114,7 +113,7 @@ def simulate_lsv2(
     model: Annotated[HeidenhainModel, typer.Option(help="Which control")] = HeidenhainModel.TNC640,
     program: Annotated[Path | None, typer.Option(help="Shown in place of the program that is run")] = None,
     scope: Annotated[bool, typer.Option("--scope", help="The iTNC 530 shows its oscilloscope: servo axes X, Y, Z")] = False,
-    effect: Annotated[str | None, typer.Option(help="One that the axes have and their description does not tell")] = None,
+    effect: Annotated[str | None, typer.Option(help="An effect that the axes have and their description leaves out")] = None,
     on: Annotated[str, typer.Option(help="The axis of the effect")] = "x",
     machine_out: Annotated[Path | None, typer.Option(help="Write the description of the axes there, a machine.toml")] = None,
     state_file: StateFile = None,

@@ -12,13 +12,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.options import StorePlace
+from cnctwin.commands.options import From, StateDir, StorePlace, To
 from cnctwin.errors import UsageError
 from cnctwin.memory.parts.journal import Journal
 from cnctwin.memory.parts.record_log import parts
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.processes.stopping import stopped_by_signals
-from cnctwin.terminal.moment import moment_ms
+from cnctwin.terminal.moment import moment_ms, stretch_ms
 from edge.state_dir import state_dir as folder_for_state
 from processors.alerts.courier.secret import read_secret
 from processors.alerts.receivers import names_secret, url_fault
@@ -27,14 +27,12 @@ if TYPE_CHECKING:
     from cnctwin.memory.parts.delivery import Receiver
 
 parts_app = typer.Typer(no_args_is_help=True, help="As-built records of parts: list, export, deliver to an MES or a PLM.")
-Machine = Annotated[str | None, typer.Option(help="Only this machine", show_default=False)]
-Begin = Annotated[str | None, typer.Option("--from", help="ISO 8601 or ms; else all", show_default=False)]
-End = Annotated[str | None, typer.Option("--to", help="ISO 8601 or ms; else now", show_default=False)]
+Machine = Annotated[str | None, typer.Option(help="Name of the machine; else all", show_default=False)]
 EVERY_S = 5.0
 
 
 @parts_app.command("list")
-def list_parts(machine: Machine = None, store: StorePlace = None, begin: Begin = None, end: End = None) -> None:
+def list_parts(machine: Machine = None, store: StorePlace = None, begin: From = None, end: To = None) -> None:
     """One line for each part."""
     table = Table()
     for column in ("machine", "no.", "program", "began", "ended", "cycle s", "active s", "interrupted s", "complete"):
@@ -52,8 +50,8 @@ def list_parts(machine: Machine = None, store: StorePlace = None, begin: Begin =
 def export(
     machine: Machine = None,
     store: StorePlace = None,
-    begin: Begin = None,
-    end: End = None,
+    begin: From = None,
+    end: To = None,
     out: Annotated[Path | None, typer.Option(help="A file; else standard output", show_default=False)] = None,
 ) -> None:
     """All records as JSON, one a line."""
@@ -77,7 +75,7 @@ def deliver(
         str | None, typer.Option(help="Parts finished before it are not sent; else before the first start", show_default=False)
     ] = None,
     once: Annotated[bool, typer.Option("--once", help="Deliver what is due, then end; 1 = something could not be")] = False,
-    state_dir: Annotated[Path | None, typer.Option(help="Keeps what was delivered", show_default=False)] = None,
+    state_dir: StateDir = None,
 ) -> None:
     """Send each record by POST, at least once and in order; a receiver knows it again by its id."""
     from cnctwin.memory.parts.delivery import Delivery
@@ -120,9 +118,7 @@ def _receiver(url: str, secret: str | None, bearer: str | None) -> "Receiver":
 
 
 def _records(machine: str | None, store: str | None, begin: str | None, end: str | None) -> list[dict[str, Any]]:
-
-    from_ms = 0 if begin is None else moment_ms(begin, "--from")
-    to_ms = time.time_ns() // 1_000_000 + 1 if end is None else moment_ms(end, "--to")
+    from_ms, to_ms = stretch_ms(begin, end)
     opened = open_store(store or default_place())
     try:
         known = opened.machines()

@@ -18,20 +18,18 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson, StorePlace
+from cnctwin.commands.options import AsJson, Device, Devices, FromNeeded, StorePlace, To
 from cnctwin.errors import UsageError
 from cnctwin.memory.row_numbers import holes_text, saved_holes
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
 from cnctwin.memory.store.opening import check_machine, default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
 from cnctwin.processes.extras import needed_by
-from cnctwin.terminal.moment import length_ms, moment_ms, moment_text
+from cnctwin.terminal.moment import length_ms, moment_text, stretch_ms
 
 store_app = typer.Typer(no_args_is_help=True, help="The store: what it holds, what it costs, a stretch of it.")
 
 Machine = Annotated[str, typer.Argument(help="Name of the machine")]
-From = Annotated[str, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), ms since 1970, or -15m")]
-To = Annotated[str, typer.Option("--to", help="The same; now where it is left out")]
 _BYTES = re.compile(r"(\d+(?:\.\d+)?)\s*([kMGT]?)B?", re.IGNORECASE)
 _POWERS = {"": 0, "k": 1, "m": 2, "g": 3, "t": 4}
 
@@ -41,7 +39,7 @@ def plan_command(
     where: StorePlace = None,
     machines: Annotated[int | None, typer.Option(help="How many machines; else as the store has seen", min=1)] = None,
     signals: Annotated[int, typer.Option(help="Slow signals of each", min=1)] = 20,
-    rate_hz: Annotated[float, typer.Option("--rate-hz", help="How often each changes a second", min=0.001)] = 10.0,
+    rate_hz: Annotated[float, typer.Option("--rate-hz", help="Changes a second of each signal", min=0.001)] = 10.0,
     vibration_hz: Annotated[float, typer.Option(help="Samples a second of each vibration axis", min=0.0)] = 0.0,
     vibration_axes: Annotated[int, typer.Option(help="Vibration axes of each machine", min=1)] = 3,
     disk: Annotated[str | None, typer.Option(help="How much the store may take, as 40GB; else what the disk has left")] = None,
@@ -99,16 +97,14 @@ def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
 def query_command(
     machine: Machine,
     signals: Annotated[list[str], typer.Argument(help="Names of signals")],
-    from_: From,
-    to: To = "",
-    every: Annotated[str | None, typer.Option(help="Windows, as 1s or 1m; else samples as they came")] = None,
+    from_: FromNeeded,
+    to: To = None,
+    every: Annotated[str | None, typer.Option(help="Windows, as 100ms, 1s or 1m; else each sample as it came")] = None,
     where: StorePlace = None,
     as_json: AsJson = False,
 ) -> None:
     """Print samples or windows as CSV, or JSON."""
-    query = Query(
-        machine, tuple(signals), moment_ms(from_), moment_ms(to) if to else _now_ms(), length_ms(every) if every else None
-    )
+    query = Query(machine, tuple(signals), *stretch_ms(from_, to), length_ms(every) if every else None)
     with _opened(where) as store:
         check_machine(store, machine)
         columns = store.query(query)
@@ -127,17 +123,17 @@ def query_command(
 @store_app.command("export")
 def export_command(
     machine: Machine,
-    from_: From,
-    to: To,
+    from_: FromNeeded,
     out: Annotated[Path, typer.Option(help="Run log to write, .parquet or .csv")],
-    every: Annotated[str | None, typer.Option(help="Windows, as 100ms; else each sample as it came")] = None,
-    held: Annotated[bool, typer.Option("--held", help="A signal that says nothing keeps what it said last")] = False,
+    to: To = None,
+    every: Annotated[str | None, typer.Option(help="Windows, as 100ms, 1s or 1m; else each sample as it came")] = None,
+    held: Annotated[bool, typer.Option("--held", help="A signal keeps its last value until the next one comes")] = False,
     where: StorePlace = None,
 ) -> None:
     """Write a stretch of a machine as a run log, which gap diagnosis, identification and training read."""
     with needed_by("a run log", "twin"):
         from cnctwin.memory.store.run_export import export
-    span_ms, every_ms = (moment_ms(from_), moment_ms(to)), length_ms(every) if every else None
+    span_ms, every_ms = stretch_ms(from_, to), length_ms(every) if every else None
     rows = export(where or default_place(), machine, span_ms, out, every_ms=every_ms, held=held)
     sys.stdout.write(f"{rows} rows in {out}\n")
 
@@ -145,9 +141,9 @@ def export_command(
 @store_app.command("import")
 def import_command(
     recording: Annotated[Path, typer.Argument(help="An SHDR log, or time|key|value text")],
-    devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
+    devices: Devices = None,
     machine: Annotated[str | None, typer.Option(help="Under which name; else the device's, else the file's")] = None,
-    device: Annotated[str | None, typer.Option(help="Which device of the model, where there are several")] = None,
+    device: Device = None,
     where: StorePlace = None,
 ) -> None:
     """Put a recording into a store as if an edge had said it, and pin it; then it can be replayed."""

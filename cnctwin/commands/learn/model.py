@@ -10,13 +10,13 @@ from typing import Annotated, Any
 
 import typer
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, From, StorePlace, To
 from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import DIGITS, faults_of
 from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
-from cnctwin.terminal.moment import TIME, moment_ms
+from cnctwin.terminal.moment import stretch_ms
 from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 
@@ -25,13 +25,10 @@ model_app = typer.Typer(
     no_args_is_help=True, help="Versions of models: which counts, what a challenger has to show, the way back."
 )
 Kind = Annotated[str, typer.Argument(help="residual, anomaly, detector")]
-Machine = Annotated[str, typer.Argument(help="Whose model")]
-Version = Annotated[str, typer.Argument(help="Its digits, or the first of them")]
+Machine = Annotated[str, typer.Argument(help="Name of the machine")]
+Version = Annotated[str, typer.Argument(help="Version: its digits, or the first of them")]
 Models = Annotated[Path | None, typer.Option(help=f"Folder of the registry; else ${VARIABLE} or `models` in the state folder")]
-Runs = Annotated[list[Path] | None, typer.Option(help="Run logs")]
-StorePlace = Annotated[str | None, typer.Option(help="Folder or URL of the store, with --from and --to", show_default=False)]
-From = Annotated[str | None, typer.Option("--from", help=TIME, show_default=False)]
-To = Annotated[str | None, typer.Option(help=f"{TIME}; else now", show_default=False)]
+Runs = Annotated[list[Path] | None, typer.Option(help="Run log, in place of the store; may be given again")]
 DAY_MS = 86_400_000
 
 
@@ -83,7 +80,9 @@ def promote(
     kind: Kind,
     machine: Machine,
     version: Version,
-    because: Annotated[str, typer.Option(help="Why, where it has not won a comparison")] = "",
+    because: Annotated[
+        str, typer.Option("--why", "--because", help="Why, for the log; needed where it has not won a comparison")
+    ] = "",
     models: Models = None,
 ) -> None:
     """Let a version count. The one before is kept warm for 48 h."""
@@ -93,7 +92,7 @@ def promote(
     folder, before = own.named(version), own.pointer()
     is_won = before is None or won(own, folder.name, registry.comparisons(own))
     if not is_won and not because.strip():
-        raise UsageError(f"{folder.name} has not won against {before and before.champion}: compare it, or say --because why")
+        raise UsageError(f"{folder.name} has not won against {before and before.champion}: compare it, or give --why")
     pointer = registry.promoted(own, folder.name, because.strip() or "it won its comparison", time.time())
     _say(_turned(own, pointer.champion, pointer.previous, pointer.warm_until))
 
@@ -102,7 +101,7 @@ def promote(
 def rollback(
     kind: Kind,
     machine: Machine,
-    because: Annotated[str, typer.Option(help="Why")] = "rolled back",
+    because: Annotated[str, typer.Option("--why", "--because", help="Why, for the log")] = "rolled back",
     models: Models = None,
 ) -> None:
     """Let the champion before count again."""
@@ -115,7 +114,7 @@ def rollback(
 def prune(
     kind: Kind,
     machine: Machine,
-    keep: Annotated[int, typer.Option(help="Of the newest versions", min=1)] = 5,
+    keep: Annotated[int, typer.Option(help="How many of the newest versions to keep", min=1)] = 5,
     models: Models = None,
 ) -> None:
     """Delete old versions; never the champion, the one that is warm, or the golden week."""
@@ -128,7 +127,7 @@ def prune(
 def golden(
     kind: Kind,
     machine: Machine,
-    run: Annotated[Path | None, typer.Option(help="A run log")] = None,
+    run: Annotated[Path | None, typer.Option("--runs", "--run", help="Run log, in place of the store")] = None,
     store: StorePlace = None,
     from_: From = None,
     to: To = None,
@@ -155,7 +154,7 @@ def compare(
     tolerance_pct: Annotated[
         float, typer.Option(min=0.0, max=100.0, help="Worse on the golden week by so much still passes")
     ] = 5.0,
-    hours_min: Annotated[float, typer.Option(min=0.0, help="That the holdout has to have")] = 24.0,
+    hours_min: Annotated[float, typer.Option(min=0.0, help="Hours that the holdout has to have")] = 24.0,
     does_promote: Annotated[bool, typer.Option("--promote", help="Let the challenger count where it wins")] = False,
     models: Models = None,
     as_json: AsJson = False,
@@ -218,11 +217,10 @@ def _stretches(machine: str, runs: list[Path], store: str | None, from_: str | N
         return [read_stretch(path) for path in runs]
     if from_ is None:
         raise UsageError("no data is named: give run logs, or --from and --to of the store")
-    to_ms = round(1000.0 * time.time()) if to is None else moment_ms(to, "--to")
     where = store or str(default_place())
     opened = open_store(where, writable=False)
     try:
-        return [stretch_of_store(opened, machine, moment_ms(from_, "--from"), to_ms, where)]
+        return [stretch_of_store(opened, machine, *stretch_ms(from_, to), where)]
     finally:
         opened.close()
 

@@ -2,12 +2,11 @@
 
 import socket
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import Broker, Group, Kafka, KafkaConfig, Machines
+from cnctwin.commands.options import Broker, Config, Group, Kafka, KafkaConfig, Machines, StateDir
 from cnctwin.machines.place import machines_folder
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
@@ -17,16 +16,16 @@ from edge.state_dir import state_dir as folder_for_state
 def bridge(
     kafka: Kafka = None,
     kafka_config: KafkaConfig = None,
-    config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
+    config: Config = None,
     broker: Broker = None,
     group: Group = "cnc",
-    name: Annotated[str, typer.Option(help="Name of this bridge, the same at each start; else the computer's name")] = "",
+    name: Annotated[
+        str, typer.Option("--name", "--member", help="Name of this bridge, the same at each start; else the computer's name")
+    ] = "",
     nodes: Annotated[str, typer.Option(help="Edge nodes to read: patterns, separated by commas")] = "*",
     results: Annotated[str, typer.Option(help="Processors whose results it publishes: names, all or none")] = "all",
     processors: Annotated[str, typer.Option(help="Processors that run on Kafka: names; else all but the historian")] = "",
-    state_dir: Annotated[
-        Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
-    ] = None,
+    state_dir: StateDir = None,
     machines: Machines = None,
     keep_session: Annotated[
         float, typer.Option(help="Hours for which the broker keeps what it cannot deliver; 0 = none (docs/kafka.md)", min=0.0)

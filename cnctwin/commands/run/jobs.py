@@ -15,7 +15,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from cnctwin.commands.options import AsJson, Broker, Group, Wait
+from cnctwin.commands.options import AsJson, Broker, Dask, Group, Wait
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded, read_text
 from cnctwin.jobs.client import JobsClient, NoAnswerError
@@ -36,7 +36,7 @@ from twin.vocabulary.nodes import JOBS_NODE
 jobs_app = typer.Typer(
     no_args_is_help=True, help="Optimise, identify, diagnose as jobs: asked for over the broker, done in turn."
 )
-JobId = Annotated[str, typer.Argument(metavar="ID", help="As `list` shows it")]
+JobId = Annotated[str, typer.Argument(metavar="ID", help="Id of the job, as `list` shows it")]
 GONE_S_MAX = 60.0
 TABLE_WIDTH = 140
 
@@ -52,17 +52,25 @@ class Kind(StrEnum):
 @jobs_app.command("run")
 def run(
     files: Annotated[
-        Path | None, typer.Option(help="Requests may name files below it, and no others", show_default=False)
+        Path | None,
+        typer.Option(
+            "--jobs-files",
+            "--files",
+            help="Folder below which requests may name files; else they may name none",
+            show_default=False,
+        ),
     ] = None,
-    folder: Annotated[Path | None, typer.Option("--dir", help="Keeps jobs and results; else jobs in the state folder")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--dir", "--jobs", help="Folder of jobs and results; else jobs in the state folder")
+    ] = None,
     broker: Broker = None,
     group: Group = "cnc",
     workers: Annotated[int, typer.Option(help="Processes that a job is spread over", min=1, max=256)] = 1,
-    dask: Annotated[str | None, typer.Option(help="tcp://host:8786 or tls://…: a Dask scheduler", show_default=False)] = None,
+    dask: Dask = None,
     hours_max: Annotated[float, typer.Option(help="A job that takes longer is ended", min=0.001, max=8760.0)] = 24.0,
     queued_max: Annotated[int, typer.Option(help="Jobs that may wait", min=1, max=10_000)] = 50,
     kept_max: Annotated[int, typer.Option(help="Jobs that are kept when they are over", min=1, max=10_000)] = 100,
-    kept_days: Annotated[float, typer.Option(help="And for how long", min=0.01, max=36_500.0)] = 30.0,
+    kept_days: Annotated[float, typer.Option(help="Days for which they are kept", min=0.01, max=36_500.0)] = 30.0,
 ) -> None:
     """Take jobs from the broker and do them, one at a time, until SIGTERM or Ctrl-C; what runs then goes on at the next start."""
     if files is not None and not files.is_dir():
@@ -84,19 +92,21 @@ def run(
 @jobs_app.command("submit")
 def submit(
     request: Annotated[Path | None, typer.Argument(help="A request as JSON; else the options", show_default=False)] = None,
-    job: Annotated[Kind | None, typer.Option(help="What is to be done", show_default=False)] = None,
+    job: Annotated[Kind | None, typer.Option(help="Kind of job", show_default=False)] = None,
     case: Annotated[str | None, typer.Option(help="identify, diagnose: a folder below the consumer's files")] = None,
     free_gains: Annotated[bool, typer.Option("--free-gains", help="identify: fit the loop gains too")] = False,
     program: Annotated[Path | None, typer.Option(help="optimise: a file here, which is sent")] = None,
-    machine: Annotated[Path | None, typer.Option(help="optimise: a machine.toml here, which is sent")] = None,
+    machine: Annotated[
+        Path | None, typer.Option("--machine", "--machine-file", help="optimise: a machine.toml here, which is sent")
+    ] = None,
     objective: Annotated[str | None, typer.Option(help="optimise: time, cost or pareto")] = None,
     force_limit_n: Annotated[float | None, typer.Option(help="optimise: no cutting force above it")] = None,
-    probability: Annotated[float | None, typer.Option(help="optimise: with which limits are kept")] = None,
-    seed: Annotated[int | None, typer.Option(help="optimise: of the search")] = None,
-    evolutions: Annotated[int | None, typer.Option(help="optimise: how many")] = None,
-    population: Annotated[int | None, typer.Option(help="optimise: how many in each")] = None,
+    probability: Annotated[float | None, typer.Option(help="optimise: probability with which the force limit is kept")] = None,
+    seed: Annotated[int | None, typer.Option(help="optimise: seed of the random numbers")] = None,
+    evolutions: Annotated[int | None, typer.Option(help="optimise: evolutions of each island")] = None,
+    population: Annotated[int | None, typer.Option(help="optimise: programs in each island")] = None,
     speed_changes: Annotated[str | None, typer.Option(help="optimise: anywhere, in_air or per_tool")] = None,
-    job_id: Annotated[str | None, typer.Option("--id", help="The same id twice is the same job")] = None,
+    job_id: Annotated[str | None, typer.Option("--id", help="Id of the job: asking twice with the same one asks once")] = None,
     follow: Annotated[bool, typer.Option("--follow", help="Stay until it is over")] = False,
     broker: Broker = None,
     wait_s: Wait = 15.0,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import Broker, Group, Kafka, KafkaConfig, Machines
+from cnctwin.commands.options import Broker, Config, Group, Kafka, KafkaConfig, Machines, StateDir
 from cnctwin.machines.place import machines_folder
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
@@ -15,17 +15,16 @@ from edge.state_dir import state_dir as folder_for_state
 
 def process(
     names: Annotated[list[str], typer.Argument(help="thermal, cutting_force, mirror, …")],
-    config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
+    config: Config = None,
     broker: Broker = None,
     group: Group = "cnc",
-    state_dir: Annotated[
-        Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
-    ] = None,
+    state_dir: StateDir = None,
     machines: Machines = None,
     kafka: Kafka = None,
     kafka_config: KafkaConfig = None,
     member: Annotated[
-        str, typer.Option(help="With Kafka: name of this runner, the same at each start; else the computer's")
+        str,
+        typer.Option("--member", "--name", help="With Kafka: name of this runner, the same at each start; else the computer's"),
     ] = "",
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""

@@ -28,8 +28,8 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 alerts_app = typer.Typer(no_args_is_help=True, help="What fires, who knows of it, and who takes care of it.")
 
-By = Annotated[str, typer.Option(help="Who says so")]
-Comment = Annotated[str, typer.Option(help="Why")]
+By = Annotated[str, typer.Option(help="Who does it")]
+Comment = Annotated[str, typer.Option("--why", "--comment", help="Why, for the log")]
 
 
 @alerts_app.command("list")
@@ -47,7 +47,7 @@ def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = Fal
 
 @alerts_app.command()
 def ack(
-    fingerprint: Annotated[str, typer.Argument(help="Of the alert, or its beginning")],
+    fingerprint: Annotated[str, typer.Argument(help="Fingerprint of the alert, or its beginning")],
     by: By,
     comment: Comment = "",
     broker: Broker = None,
@@ -64,8 +64,8 @@ def ack(
 def silence(
     for_: Annotated[str, typer.Option("--for", help="How long: 90s, 30m, 2h, 1d")],
     by: By,
-    machine: Annotated[str, typer.Option(help="Of this machine; * and ? stand for any characters")] = "",
-    alert: Annotated[str, typer.Option(help="Of this name, as rule_vibration")] = "",
+    machine: Annotated[str, typer.Option(help="Alerts of this machine; * and ? stand for any characters")] = "",
+    alert: Annotated[str, typer.Option(help="Alerts of this name, as rule_vibration")] = "",
     severity: Annotated[str, typer.Option(help="low, medium or high")] = "",
     comment: Comment = "",
     broker: Broker = None,
@@ -83,7 +83,10 @@ def silence(
 
 @alerts_app.command()
 def unsilence(
-    silence: Annotated[str, typer.Argument(help="Its id, as `list` shows it")], by: By, broker: Broker = None, wait_s: Wait = 5.0
+    silence: Annotated[str, typer.Argument(help="Id of the silence, as `list` shows it")],
+    by: By,
+    broker: Broker = None,
+    wait_s: Wait = 5.0,
 ) -> None:
     """End a silence now."""
     with alert_desk(address(broker), wait_s) as desk:
@@ -92,7 +95,7 @@ def unsilence(
 
 @alerts_app.command("test")
 def try_receiver(
-    receiver: Annotated[str, typer.Argument(help="Its name in the configuration")],
+    receiver: Annotated[str, typer.Argument(help="Name of the receiver in the configuration")],
     by: By = "cnctwin alerts test",
     broker: Broker = None,
     wait_s: Wait = 5.0,

@@ -6,15 +6,15 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, Devices, Speed
 from cnctwin.demo.by_itself import ByItself
 from cnctwin.processes.stopping import stopped_by_signals
 
 
 def demo(
     recording: Annotated[Path | None, typer.Option(help="SHDR log or time|key|value text; else the simulated machine")] = None,
-    devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
-    speed: Annotated[float, typer.Option(help="How many times faster than real time, or than recorded")] = 1.0,
+    devices: Devices = None,
+    speed: Speed = 1.0,
     seconds: Annotated[float | None, typer.Option(help="Stop by itself after so long; else at Ctrl-C")] = None,
     port: Annotated[int | None, typer.Option(help="The private broker's port; else 1883 or a free one", min=1, max=65535)] = None,
     machine: Annotated[str | None, typer.Option(help="The device's name; else that of the device model")] = None,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import Broker, Group
+from cnctwin.commands.options import Broker, Config, Group, StateFile, StorePlace
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
 
@@ -13,15 +13,15 @@ from cnctwin.processes.stopping import stopped_by_signals
 def serve(
     broker: Broker = None,
     group: Group = "cnc",
-    store: Annotated[
-        str | None, typer.Option(help="Folder or address of the store; else $CNCTWIN_STORE or the default", show_default=False)
-    ] = None,
-    config: Annotated[Path | None, typer.Option(help="The processors' TOML: constants of the machines for /predict")] = None,
+    store: StorePlace = None,
+    config: Config = None,
     models: Annotated[Path | None, typer.Option(help="Folder of the models")] = None,
     diagnoses: Annotated[
         Path | None, typer.Option(help="Folder with <machine>/diagnosis.json; else that of the loop (twin run)")
     ] = None,
-    jobs: Annotated[Path | None, typer.Option(help="The batch consumer's folder, to offer the files of results")] = None,
+    jobs: Annotated[
+        Path | None, typer.Option(help="Folder of jobs and results of `cnctwin jobs run`; its files are offered")
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; another than loopback needs a token or a proxy")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 = a free one", min=0, max=65535)] = 8080,
     token_file: Annotated[Path | None, typer.Option(help="File of mode 600 with the token; else $CNCTWIN_PAGE_TOKEN")] = None,
@@ -38,9 +38,9 @@ def serve(
     ] = None,
     proxy_header: Annotated[str | None, typer.Option(help="Header in which the reverse proxy names the user")] = None,
     proxy: Annotated[str | None, typer.Option(help="Address that the proxy connects from")] = None,
-    allow_host: Annotated[list[str] | None, typer.Option(help="One more name that this server is asked by")] = None,
-    state_file: Annotated[Path | None, typer.Option(help="Keep address and state there, for a program that starts this")] = None,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser")] = False,
+    allow_host: Annotated[list[str] | None, typer.Option(help="One more host name by which clients reach this server")] = None,
+    state_file: StateFile = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in a browser")] = False,
 ) -> None:
     """The page and the runtime interface: state, predictions, history, gaps and alerts over HTTP."""
     from cnctwin.api.serve import ServeOptions

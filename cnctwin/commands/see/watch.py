@@ -10,7 +10,7 @@ from cnctwin.processes.stopping import stopped_by_signals
 
 
 def watch(
-    machine: Annotated[str | None, typer.Argument(help="Only this machine")] = None,
+    machine: Annotated[str | None, typer.Argument(help="Name of the machine; else all")] = None,
     broker: Broker = None,
     group: Group = "cnc",
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, MachineDescription
 from cnctwin.errors import UsageError
 from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_text import read_text
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 def expect(
     programs: Annotated[list[Path], typer.Argument(help="Part programs; the name of a file is that of its program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine")],
+    machine: MachineDescription,
     out: Annotated[Path, typer.Option(help="Folder of expectations, which the processors read")] = Path("expectations"),
     tools: Annotated[Path | None, typer.Option(help="TOML with \\[tools.N], in place of those of the machine")] = None,
     lines: Annotated[
         str, typer.Option(help="How the control counts lines: n_words, from_0, from_1; auto = N words where most blocks have one")
     ] = "auto",
-    name: Annotated[str | None, typer.Option(help="Of the machine on the broker; else that of its description")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the machine on the broker; else that of its description")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Work out again what is up to date")] = False,
     as_json: AsJson = False,
 ) -> None:

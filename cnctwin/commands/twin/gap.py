@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, Dask, Seed
 from cnctwin.commands.twin.gap_case import case
 from cnctwin.errors import UsageError
 from cnctwin.processes.extras import needed_by
@@ -82,13 +82,13 @@ def score(
 @gap_app.command()
 def check(
     cases: Annotated[int, typer.Option(help="Machines to draw", min=1)] = 40,
-    seed: Annotated[int, typer.Option(help="Of the machines; another one, other machines", min=0)] = 1,
+    seed: Seed = 1,
     keep: Annotated[
         Path | None,
         typer.Option(help="A folder for what is done: with the same cases and seed, the check goes on where it stopped"),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes, one thread each; as many as there are cores", min=1)] = None,
-    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/jobs.md)")] = None,
+    dask: Dask = None,
     as_json: AsJson = False,
 ) -> None:
     """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size.

@@ -9,39 +9,36 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import WHEN, AsJson, From, Programs, StorePlace, To
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
 from cnctwin.processes.extras import needed_by
 from cnctwin.terminal.console import standard_output
-from cnctwin.terminal.moment import moment_ms, moment_text
+from cnctwin.terminal.moment import moment_ms, moment_text, stretch_ms
 from cnctwin.terminal.spinner import working
 
 if TYPE_CHECKING:
     from cnctwin.composing.composed import Composed
 
 ON_SHOWN = 4
-Machine = Annotated[str | None, typer.Option("--machine", help="Name of the machine in the store")]
-From = Annotated[str | None, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), or -8h; else all")]
-To = Annotated[str | None, typer.Option("--to", help="The same; else the end of what the store has")]
+Machine = Annotated[str | None, typer.Option("--machine", help="Name of the machine, as the store has it")]
 MachineFile = Annotated[
     Path | None, typer.Option(help="machine.toml; else M.toml in $CNCTWIN_MACHINES or ./machines, else an assumed machine")
 ]
-Programs = Annotated[Path | None, typer.Option(help="The folder with the NC files that the machine runs")]
 Ambient = Annotated[float | None, typer.Option("--ambient-c", help="The surroundings, °C, where no signal tells them")]
 
 
 def case(
     out: Annotated[Path, typer.Option(help="The folder to write; a case that is there is replaced")],
     runs: Annotated[list[Path] | None, typer.Argument(help="Run logs, .parquet or .csv; else --machine of a store")] = None,
-    store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
+    store: StorePlace = None,
     machine: Machine = None,
     from_: From = None,
     to: To = None,
     machine_file: MachineFile = None,
     programs: Programs = None,
-    healthy_from: Annotated[str | None, typer.Option(help="Beginning of a time in which the twin was right")] = None,
-    healthy_to: Annotated[str | None, typer.Option(help="Its end")] = None,
+    healthy_from: Annotated[str | None, typer.Option(help=f"Start of a stretch in which the twin was right: {WHEN}")] = None,
+    healthy_to: Annotated[str | None, typer.Option(help="End of the stretch in which the twin was right")] = None,
     ambient_c: Ambient = None,
     fit: Annotated[list[str] | None, typer.Option(help="Run log to learn from")] = None,
     check: Annotated[list[str] | None, typer.Option(help="Run log to be judged on")] = None,
@@ -147,10 +144,7 @@ def _span_ms(from_: str | None, to: str | None) -> tuple[int, int] | None:
     """Return the stretch that --from and --to say; None where neither does."""
     if from_ is None and to is None:
         return None
-    span = moment_ms(from_, "--from") if from_ else 0, moment_ms(to or "-0s", "--to")
-    if span[1] <= span[0]:
-        raise UsageError(f"--to {to or 'now'} is not after --from {from_}; give a stretch of time")
-    return span
+    return stretch_ms(from_, to)
 
 
 def _healthy_ms(from_: str | None, to: str | None) -> tuple[int, int] | None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
-from cnctwin.commands.twin.gap_case import Ambient, From, Machine, MachineFile, To, composed_of
+from cnctwin.commands.options import AsJson, From, Seed, StorePlace, To
+from cnctwin.commands.twin.gap_case import Ambient, Machine, MachineFile, composed_of
 from cnctwin.errors import UsageError
 from cnctwin.files.output import write
 from cnctwin.processes.extras import needed_by
@@ -37,7 +37,7 @@ def identify(
         Path | None, typer.Argument(help="The folder with case.toml, machine.toml and recorded runs; else --machine of a store")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the identified machine.toml there")] = None,
-    store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
+    store: StorePlace = None,
     machine: Machine = None,
     from_: From = None,
     to: To = None,
@@ -46,8 +46,10 @@ def identify(
     method: Annotated[
         Method, typer.Option(help="least-squares, or the reference paper's genetic algorithm beside it")
     ] = Method.LSQ,
-    free_gains: Annotated[bool, typer.Option("--free-gains", help="Fit S_pp, S_vp, S_vi; else gains are as stated")] = False,
-    seed: Annotated[int, typer.Option(help="Of the genetic algorithm", min=0)] = 1,
+    free_gains: Annotated[
+        bool, typer.Option("--free-gains", help="Fit the loop gains S_pp, S_vp, S_vi too; else they stay as stated")
+    ] = False,
+    seed: Seed = 1,
     as_json: AsJson = False,
 ) -> None:
     """Fit the twin's constants to recordings, with confidence intervals, and say which cannot be known from them."""

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, Dask, MachineDescription, Seed
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded
 from cnctwin.processes.extras import needed_by
@@ -33,7 +33,7 @@ BINDS_SHOWN, FRONT_SHOWN = 6, 20
 
 def optimise(
     program: Annotated[Path, typer.Argument(help="The part program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine, or the twin.toml of a diagnosis")],
+    machine: MachineDescription,
     out: Annotated[Path, typer.Option(help="Write the program there; its report beside it as .html, everything as .json")],
     objective: Annotated[str, typer.Option(help="time, cost or pareto")] = "time",
     force_limit_n: Annotated[float | None, typer.Option(help="Greatest cutting force, N; else that of \\[limits]")] = None,
@@ -48,12 +48,12 @@ def optimise(
     pick: Annotated[int | None, typer.Option(help="pareto: which program of the front, from 0; else its knee", min=0)] = None,
     leave: Annotated[list[int] | None, typer.Option(help="Leave this line alone (from 1); may be given again")] = None,
     engagement: Annotated[Path | None, typer.Option(help="Run log of this program: take what it cuts, not \\[stock]")] = None,
-    seed: Annotated[int, typer.Option(help="Of the search", min=0)] = 1,
-    evolutions: Annotated[int, typer.Option(help="Of each island", min=0)] = 60,
-    population: Annotated[int, typer.Option(help="Of each island, even", min=4)] = 64,
+    seed: Seed = 1,
+    evolutions: Annotated[int, typer.Option(help="Evolutions of each island", min=0)] = 60,
+    population: Annotated[int, typer.Option(help="Programs in each island, an even number", min=4)] = 64,
     islands: Annotated[int, typer.Option(help="Populations beside each other", min=1)] = 2,
     workers: Annotated[int, typer.Option(help="Processes for the islands", min=1)] = 1,
-    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/jobs.md)")] = None,
+    dask: Dask = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Do not go on with a search that was stopped")] = False,
     no_resimulation: Annotated[
         bool, typer.Option("--no-resimulation", help="Do not run both programs on the whole twin")

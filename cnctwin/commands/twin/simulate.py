@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, MachineDescription
 from cnctwin.errors import UsageError
 from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.output import check_suffix, write
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def simulate(
     program: Annotated[Path, typer.Argument(help="The part program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine to run it on")],
+    machine: MachineDescription,
     out: Annotated[Path | None, typer.Option(help="Write the run log there, .parquet or .csv")] = None,
     seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course", min=0)] = None,
     as_json: AsJson = False,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cnctwin.commands.options import AsJson, Broker, Group, Machines, StorePlace, Wait
+from cnctwin.commands.options import AsJson, Broker, Config, Group, Machines, StorePlace, Wait
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
 from cnctwin.processes.extras import needed_by
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 twin_app = typer.Typer(
     no_args_is_help=True, help="The description of a machine: which is live, which challenger waits, promote it, go back."
 )
-MachineName = Annotated[str, typer.Argument(metavar="MACHINE", help="Its name on the broker")]
+MachineName = Annotated[str, typer.Argument(metavar="MACHINE", help="Name of the machine on the broker")]
 By = Annotated[str | None, typer.Option(help="Who does it; else the user of this process", show_default=False)]
 Why = Annotated[str, typer.Option(help="Why, for the log")]
-Version = Annotated[str, typer.Option(help="Its digits, or the first of them", show_default=False)]
+Version = Annotated[str, typer.Option(help="Version: its digits, or the first of them", show_default=False)]
 STEPS_SHOWN = 12
 
 
@@ -124,7 +124,7 @@ def withdraw(
 @twin_app.command()
 def programs(
     machine: MachineName,
-    folder: Annotated[Path, typer.Option("--programs", help="The folder with the NC files that the machine runs")],
+    folder: Annotated[Path, typer.Option("--programs", help="Folder with the NC files that the machine runs")],
     machines: Machines = None,
 ) -> None:
     """Plan the programs of a machine: live, each section between tool changes is then compared with its planned time."""
@@ -145,16 +145,21 @@ def programs(
 @twin_app.command("run")
 def run_loop(
     machines: Machines = None,
-    config: Annotated[Path | None, typer.Option(help="The processors' TOML, with the table [loop]")] = None,
+    config: Config = None,
     store: StorePlace = None,
     jobs_files: Annotated[
-        Path | None, typer.Option(help="The --files of `cnctwin jobs run`; else cases in the state folder", show_default=False)
+        Path | None,
+        typer.Option(
+            help="Folder below which requests may name files, as of `jobs run`; else cases in the state folder",
+            show_default=False,
+        ),
     ] = None,
     jobs: Annotated[
-        Path | None, typer.Option(help="The --dir of `cnctwin jobs run`; else jobs in the state folder", show_default=False)
+        Path | None,
+        typer.Option(help="Folder of jobs and results, as of `jobs run`; else jobs in the state folder", show_default=False),
     ] = None,
     diagnoses: Annotated[
-        Path | None, typer.Option(help="The --diagnoses of `cnctwin serve`; else diagnoses beside the descriptions")
+        Path | None, typer.Option(help="Folder with <machine>/diagnosis.json; else diagnoses beside the descriptions")
     ] = None,
     broker: Broker = None,
     group: Group = "cnc",

@@ -1,19 +1,18 @@
 """`cnctwin validate` on the command line; `cnctwin/validation` does it, and is imported when it is run."""
 
-import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import AsJson, Group
+from cnctwin.commands.options import FROM, AsJson, Config, Group, Machines, Programs, StorePlace, To
 from cnctwin.errors import UsageError
 from cnctwin.machines.folder import MachineFolder
 from cnctwin.machines.place import machines_folder
 from cnctwin.processes.extras import needed_by
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
-from cnctwin.terminal.moment import TIME, moment_ms
+from cnctwin.terminal.moment import stretch_ms
 from edge.state_dir import state_dir
 from twin.vocabulary.nodes import VALIDATION_NODE
 
@@ -21,36 +20,32 @@ DAY_MS = 86_400_000
 
 
 def validate(
-    machine: Annotated[str, typer.Option(help="Which machine")],
-    store: Annotated[
-        str | None, typer.Option(help="Folder or URL of the store; else $CNCTWIN_STORE or the default", show_default=False)
+    machine: Annotated[str, typer.Option(help="Name of the machine, as the store has it")],
+    store: StorePlace = None,
+    runs: Annotated[
+        list[Path] | None, typer.Option(help="Run log, in place of the store; may be given again, and the worst counts")
     ] = None,
-    runs: Annotated[list[Path] | None, typer.Option(help="Run logs in place of the store; of several the worst counts")] = None,
-    from_: Annotated[str | None, typer.Option("--from", help=f"{TIME}; else a day before --to", show_default=False)] = None,
-    to: Annotated[str | None, typer.Option(help=f"{TIME}; else now", show_default=False)] = None,
+    from_: Annotated[str | None, typer.Option("--from", help=f"{FROM}; else a day before --to", show_default=False)] = None,
+    to: To = None,
     truth: Annotated[
         list[Path] | None, typer.Option(help="Run log of a dynamometer, thermocouple, accelerometer; one for each of --runs")
     ] = None,
-    programs: Annotated[Path | None, typer.Option(help="Folder with the NC files, by the names the control tells")] = None,
-    config: Annotated[Path | None, typer.Option(help="The processors' TOML; [validation] in it has the budgets")] = None,
+    programs: Programs = None,
+    config: Config = None,
     twin: Annotated[
         Path | None, typer.Option(help="machine.toml of the twin; else the machine's live description in --machines")
     ] = None,
-    machines: Annotated[
-        Path | None, typer.Option(help="Folder of descriptions; else `machines` beside --config, $CNCTWIN_MACHINES, ./machines")
-    ] = None,
+    machines: Machines = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the history; else `validation` in the state folder")] = None,
     keep: Annotated[bool, typer.Option(help="Keep this night in the history")] = True,
-    broker: Annotated[str | None, typer.Option(help="Publish there: mqtt[s]://[user@]host[:port]", show_default=False)] = None,
+    broker: Annotated[
+        str | None, typer.Option(help="Publish the figures: mqtt[s]://[user@]host[:port]", show_default=False)
+    ] = None,
     group: Group = "cnc",
     as_json: AsJson = False,
 ) -> None:
     """Twin against ground truth: temperature, force, vibration, following error, cycle time. Exit code 1: over a budget."""
-    now_ms = round(1000.0 * time.time())
-    to_ms = now_ms if to is None else moment_ms(to, "--to")
-    from_ms = to_ms - DAY_MS if from_ is None else moment_ms(from_, "--from")
-    if from_ms >= to_ms:
-        raise UsageError(f"--from {from_} is not before --to {to or 'now'}")
+    from_ms, to_ms = stretch_ms(from_, to, DAY_MS)
     if runs and store is not None:
         raise UsageError("--runs and --store: give one of them")
     folder = None if twin is not None else machines_folder(machines, config)

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from cnctwin.commands.learn.train.detector import train_detector
 from cnctwin.commands.learn.train.residual import train_residual
+from cnctwin.commands.options import AsJson, Seed
 from cnctwin.errors import UsageError
 
 train_app = typer.Typer(
@@ -47,7 +48,7 @@ def train_anomaly(
         ),
     ] = "parts",
     common_mode_factor: Annotated[float, typer.Option(min=0.001, help="A peer with this share of a score makes it common")] = 0.5,
-    exclude_gated_peers: Annotated[bool, typer.Option(help="Peers in a tool change are no peers")] = False,
+    exclude_gated_peers: Annotated[bool, typer.Option(help="Ignore peers while they change tools")] = False,
     tail_s: Annotated[float, typer.Option(min=0.0, max=600.0, help="Gated after the end of a tool change")] = 8.0,
     look_back_s: Annotated[
         float, typer.Option(min=0.0, max=600.0, help="Gated before its begin, where the control tells late")
@@ -58,8 +59,8 @@ def train_anomaly(
     train_share: Annotated[
         float, typer.Option(min=0.05, max=0.95, help="First part of the time, trained on; the rest calibrates")
     ] = 0.5,
-    seed: Annotated[int, typer.Option(min=0, help="Of all chance in the training")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON")] = False,
+    seed: Seed = 0,
+    as_json: AsJson = False,
 ) -> None:
     """Train a model of each machine, and fit its threshold to so many alerts a week."""
     training = _training()
@@ -95,7 +96,7 @@ def train_check(
     against: Annotated[
         Path | None, typer.Option(help="Judge on the golden week of this other model, or folder of models")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Say whether models still give the scores and alerts of their golden week. Exit code 1: one does not."""
     raise typer.Exit(_training().check_models(model, files or [], against, as_json=as_json, console=Console()))
@@ -104,7 +105,7 @@ def train_check(
 @train_app.command("promote")
 def train_promote(
     models: Annotated[Path, typer.Argument(help="Folder with models")],
-    machine: Annotated[str, typer.Argument(help="Whose model")],
+    machine: Annotated[str, typer.Argument(help="Name of the machine")],
     version: Annotated[str, typer.Argument(help="The version, or its first digits")],
 ) -> None:
     """Let another version of a machine's model score; also the way back."""

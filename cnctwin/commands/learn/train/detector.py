@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from cnctwin.commands.options import AsJson, Seed
 from cnctwin.errors import UsageError
 
 
@@ -19,13 +20,13 @@ def train_detector(
     candidates: Annotated[
         Path | None, typer.Option(help="List transients for you to label (.csv or .json), in place of a model")
     ] = None,
-    false_gates_per_day: Annotated[float, typer.Option(min=0.001, help="That the limit is set to")] = 1.0,
-    before_s: Annotated[float, typer.Option(min=0.5, max=120.0, help="Of the window around --at that holds the change")] = 12.0,
-    after_s: Annotated[float, typer.Option(min=0.5, max=120.0, help="Of the same window")] = 8.0,
+    false_gates_per_day: Annotated[float, typer.Option(min=0.001, help="False gates a day that the limit is set for")] = 1.0,
+    before_s: Annotated[float, typer.Option(min=0.5, max=120.0, help="Seconds before --at that belong to the change")] = 12.0,
+    after_s: Annotated[float, typer.Option(min=0.5, max=120.0, help="Seconds after --at that belong to the change")] = 8.0,
     stall_s: Annotated[float, typer.Option(min=0.0, max=60.0, help="How much longer a change may take")] = 4.0,
     period_s: Annotated[float, typer.Option(min=0.01, max=10.0, help="Sample period of the model")] = 0.1,
-    seed: Annotated[int, typer.Option(min=0, help="Of all chance in the training")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON")] = False,
+    seed: Seed = 0,
+    as_json: AsJson = False,
 ) -> None:
     """Learn what a tool change of a control that reports none looks like, from captures or labels."""
     try:

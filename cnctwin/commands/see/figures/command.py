@@ -2,13 +2,12 @@
 
 import json
 import sys
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from cnctwin.commands.options import AsJson, StorePlace
+from cnctwin.commands.options import AsJson, Config, FromNeeded, StorePlace, To
 from cnctwin.commands.see.figures.shown import show
 from cnctwin.errors import UsageError
 from cnctwin.figures.comma_separated import to_csv
@@ -16,35 +15,33 @@ from cnctwin.figures.documents import read_records
 from cnctwin.figures.folding import folded
 from cnctwin.figures.table import Asked, By, table
 from cnctwin.memory.store.opening import default_place, open_store
-from cnctwin.terminal.moment import moment_ms, moment_text
+from cnctwin.terminal.moment import stretch_ms
 from processors.config import read_tables
 
 NAME = "production"
 
 
 def figures(
-    begin: Annotated[str, typer.Option("--from", help="ISO 8601, ms since 1970, or -1d; the shift that holds it is in")],
-    end: Annotated[str | None, typer.Option("--to", help="The same; else now", show_default=False)] = None,
+    begin: FromNeeded,
+    end: To = None,
     machine: Annotated[str | None, typer.Option(help="One machine; else --all", show_default=False)] = None,
     every: Annotated[bool, typer.Option("--all", help="All machines of the store")] = False,
     by: Annotated[By, typer.Option(help="The rows of the table")] = By.SHIFT,
     store: StorePlace = None,
-    config: Annotated[
-        Path | None, typer.Option(help="TOML with \\[production]: calendar, expectations", show_default=False)
-    ] = None,
+    config: Config = None,
     calendar: Annotated[
         Path | None, typer.Option(help="Shift calendar, in place of the configured one", show_default=False)
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write CSV to this file; - = standard output", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """OEE, stops by reason, parts and energy, folded out of the store as the processor `production` does live."""
+    """OEE, stops by reason, parts and energy, folded out of the store as the processor `production` does live.
+
+    The shift that holds the moment of --from is counted whole.
+    """
     if (machine is None) is not every:
         raise UsageError("name one machine with --machine, or all of them with --all")
-    from_ms = moment_ms(begin, "--from")
-    to_ms = time.time_ns() // 1_000_000 if end is None else moment_ms(end, "--to")
-    if to_ms <= from_ms:
-        raise UsageError(f"--to {moment_text(to_ms)} is not after --from {moment_text(from_ms)}")
+    from_ms, to_ms = stretch_ms(begin, end)
     settings = _settings(config, calendar)
     opened = open_store(store or default_place())
     try:
