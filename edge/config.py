@@ -6,7 +6,7 @@ Checked before any I/O. Secrets do not stand in the file: it names the environme
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
@@ -17,6 +17,7 @@ from edge.section import Section
 from edge.signals import signal
 from edge.units import conversion
 from sparkplug.shown_address import shown_address
+from twin.vocabulary.faults import faults_of
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
@@ -160,11 +161,7 @@ class EdgeConfig(Generic[SourceT]):
         return self.broker.node or edge_node(self.machine.name)
 
 
-def one_line(path: Path, table: str, error: ValidationError) -> str:
-    """The first complaint of pydantic as file, key, value and what is wrong."""
-    first = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
-    if first["type"] == "extra_forbidden":
-        return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
-    shown = shown_address(repr(first["input"]))
-    return f"{path}: {key} = {shown}: {first['msg'].removeprefix('Value error, ')}"
+def faults_in(table: str, kind: Any, error: ValidationError) -> list[str]:
+    """Return the complaints of pydantic about a table as lines with key, value and what is wrong; no address shows a secret."""
+    faults = error.errors(include_url=False)
+    return faults_of([dict(fault) for fault in faults], kind, f"{table}.", lambda value: shown_address(repr(value)))
