@@ -44,7 +44,7 @@ def linear_fit(regressors: Floats, measured: Floats, noise: float, prior: tuple[
     found = Fit(np.asarray(theta, dtype=np.float64), covariance, known, float(np.sqrt(np.mean(residuals**2))), 1)
     if free.all():
         return found
-    theta, covariance = mean.astype(np.float64), np.diag(sigma**2)
+    theta, covariance = np.array(mean, dtype=np.float64), np.diag(sigma**2)
     if free.any():
         left = measured - regressors[:, ~free] @ mean[~free]
         again = linear_fit(regressors[:, free], left, noise, (mean[free], sigma[free]), blocks)

@@ -4,6 +4,7 @@ The models are pydantic's; this module knows of them only that a model has `mode
 an `alias`, and that a fault has a `loc`, a `type`, a `msg` and an `input`.
 """
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, get_args, get_origin
@@ -84,11 +85,12 @@ def _lines(fault: Mapping[str, Any], model: Any, table: str, shown: Callable[[An
     said = str(fault["msg"])
     for before, after in _SAID:
         said = said.replace(before, after)
+    said = re.sub(r"a valid dictionary( or instance of \w+)?", "a table", said)
     value = fault.get("input")
     is_shown = "input" in fault and place and isinstance(value, str | int | float | bool | None)
     text = f" = {_short(shown(value))}" if is_shown and shown is not None else ""
     for line in said.split("\n"):
-        yield f"{key}{text}: {line}" if place else f"{table if table.endswith(' ') else ''}{line}"
+        yield f"{key}{text}: {line}" if place or table.endswith(".") else f"{table}{line}"
 
 
 def _short(text: str) -> str:
@@ -122,6 +124,8 @@ def _inside(kind: Any, part: str) -> Iterator[Any]:
     if hasattr(kind, "model_fields"):
         if (field := _field(kind, part)) is not None:
             yield field.annotation
+        elif (root := kind.model_fields.get("root")) is not None:  # a model around one mapping or list
+            yield from _inside(root.annotation, part)
         return
     origin, inner = get_origin(kind), get_args(kind)
     if isinstance(origin, type) and issubclass(origin, Mapping):

@@ -78,7 +78,7 @@ def test_less_than_an_hour_is_not_judged(night: RunLog) -> None:
     assert all(one.value is None and "1 h are needed" in (one.reason or "") for one in found)
     (plan,) = still_missing(found, 0.0, 1800.0)
     keys = "temperature_mae, temperature_mae_worst_hour, temperature_rmse, temperature_rmse_worst_hour"
-    assert plan == f"{keys}: 30 min of 1 h seen in 30 min; 30 min more, at the present rate in 30 min"
+    assert plan == f"{keys}: 29.8 min of 1 h seen in 30 min; 30.2 min more, at the present rate in 30.3 min"
 
 
 def test_what_was_not_recorded_is_in_the_plan_with_its_reason(night: RunLog) -> None:
