@@ -58,7 +58,7 @@ def write_bundle(
     parts["doctor.json"] = _json(blanks.texts(report))
     parts["versions.json"] = _json(versions(environment))
     keys = ", ".join(sorted(blanks.keys)) or "nothing"
-    parts["README.txt"] = README.format(blank=BLANK, keys=keys, unread=", ".join(unread) or "nothing was left out")
+    parts["README.txt"] = README.format(blank=BLANK, keys=keys, unread=", ".join(unread) or "nothing")
     try:
         with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as bundle:
             for name, text in sorted(parts.items()):
