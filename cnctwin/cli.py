@@ -7,6 +7,7 @@ and the way out.
 import logging
 import sys
 from importlib import metadata
+from io import TextIOWrapper
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -97,6 +98,9 @@ def _entry(
 def main() -> None:
     """Run the command; every expected error is one line on stderr."""
     restrict(sys.argv[1:])
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper) and "utf" not in stream.encoding.lower():
+            stream.reconfigure(errors="replace")  # Windows' code pages have no →, and LANG=C has no µ
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(message)s")
     try:
         # Standalone, typer would report a wrong option in a box of several lines.
