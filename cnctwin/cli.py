@@ -1,7 +1,7 @@
 """The command `cnctwin`.
 
-Exit codes: 0 = done, 1 = the answer is bad news, 2 = wrong input. Errors are one line on stderr that names the culprit, the value
-and the way out.
+Exit codes: 0 = done, 1 = the answer is bad news, 2 = wrong input. Errors are on stderr, each a line that names the culprit, the
+value and the way out; a file with several faults has a line for each.
 """
 
 import logging
