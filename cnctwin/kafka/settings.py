@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cnctwin.kafka.client_log import LOG, REACH
 from processors.errors import ConfigurationError
-from twin.vocabulary.faults import faults_of, report
 
 PREFIX = "CNCTWIN_KAFKA_"
 PASSWORD = f"{PREFIX}PASSWORD"
@@ -108,5 +107,7 @@ def settings_of(bootstrap: str | None, path: Path | None, environment: Mapping[s
     try:
         return KafkaSettings.model_validate(table)
     except ValidationError as error:
+        from twin.vocabulary.faults import faults_of, report  # noqa: PLC0415  only where something is wrong
+
         faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], KafkaSettings)
         raise ConfigurationError(report(path or "kafka", faults, "docs/kafka.md")) from None
