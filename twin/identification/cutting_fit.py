@@ -44,12 +44,13 @@ def linear_fit(regressors: Floats, measured: Floats, noise: float, prior: tuple[
     found = Fit(np.asarray(theta, dtype=np.float64), covariance, known, float(np.sqrt(np.mean(residuals**2))), 1)
     if free.all():
         return found
-    theta, covariance = np.array(mean, dtype=np.float64), np.diag(sigma**2)
+    held: Floats = np.array(mean, dtype=np.float64)
+    covariance = np.diag(sigma**2)
     if free.any():
         left = measured - regressors[:, ~free] @ mean[~free]
         again = linear_fit(regressors[:, free], left, noise, (mean[free], sigma[free]), blocks)
-        theta[free], covariance[np.ix_(free, free)] = again.theta, again.covariance
-    return replace(found, theta=theta, covariance=covariance)
+        held[free], covariance[np.ix_(free, free)] = again.theta, again.covariance
+    return replace(found, theta=held, covariance=covariance)
 
 
 def fit_cutting(
