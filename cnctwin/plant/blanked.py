@@ -31,7 +31,7 @@ _HARMLESS = ("type", "language")
 
 @dataclass(slots=True)
 class Blanks:
-    """What has been taken out: the secrets themselves, which are written nowhere, and the keys that had them."""
+    """The secrets that were taken out, which are written nowhere, and the keys that had them."""
 
     secrets: set[str] = field(default_factory=set)
     keys: set[str] = field(default_factory=set)
