@@ -26,7 +26,7 @@ CONFIGURATION_BYTES_MAX = 1_000_000
 LOG_BYTES_MAX = 200_000
 LOGS = (".log", ".jsonl")
 DEFAULT = ("processors.toml", "edges", "machines", "logs")
-"""What is taken of the current folder where nothing is named."""
+"""Files and folders that are taken of the current folder where none is named."""
 README = """A bundle of `cnctwin doctor --bundle`, for a report of a fault.
 
 Secrets are taken out: {blank} stands where one was. Names of machines, hosts and signals are still in it, and so may be

@@ -1,4 +1,4 @@
-"""A plan for something that there is too little of: how much was seen, how much is needed, when that will be at the present rate."""
+"""A plan for what there is too little of: how much was seen, how much is needed, and when that will be at the present rate."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
