@@ -12,6 +12,8 @@ from typing import Any, get_args, get_origin
 FAULTS_MAX = 50
 NAMES_MAX = 16
 VALUE_CHARACTERS_MAX = 60
+_CHOICE = re.compile(r"constrained-|function-|(tuple|list|dict|literal)\[")
+"""Parts of a place that no file has: pydantic's names of what a value may be."""
 _SAID = (("Value error, ", ""), ("Assertion failed, ", ""), ("Input should", "should"))
 
 
@@ -67,7 +69,7 @@ def report(source: object, faults: Sequence[str], see: str = "") -> str:
 
 
 def _lines(fault: Mapping[str, Any], model: Any, table: str, shown: Callable[[Any], str] | None) -> Iterator[str]:
-    place = tuple(fault["loc"])
+    place = tuple(part for part in fault["loc"] if not _CHOICE.match(str(part)))
     key = (table + ".".join(map(str, place))).rstrip(". ")
     if fault["type"] == "extra_forbidden":
         yield unknown(key, str(place[-1]), sorted(_names_at(model, place[:-1])))

@@ -15,6 +15,7 @@ class Strict(BaseModel):
 class Axis(Strict):
     mass_kg: float = Field(gt=0.0)
     lead_mm: float | None = None
+    friction_n: Annotated[float, Field(ge=0.0)] | tuple[float, float] = 0.0
 
 
 class Mail(Strict):
@@ -55,6 +56,10 @@ def lines(model: type[BaseModel], value: Any, **options: Any) -> list[str]:
         ({"axes": {"x": {"mass_kg": 1, "lead_m": 2}}}, ["axes.x.lead_m is not known; did you mean lead_mm?"]),
         ({"shifts": [{"mass": 1}]}, ["shifts.0.mass is not known; did you mean mass_kg?", "shifts.0.mass_kg is missing"]),
         ({"spare": {"mass_kg": 0}}, ["spare.mass_kg = 0: should be greater than 0"]),
+        (
+            {"spare": {"mass_kg": 1, "friction_n": "much"}},
+            ["spare.friction_n = 'much': should be a valid number, unable to parse string as a number"],
+        ),
         ({"spare": 3}, ["spare = 3: should be a table"]),
         ({"receivers": {"a": {"type": "hook", "ulr": "x"}}}, ["receivers.a.hook.ulr is not known; did you mean url?"]),
         ({"receivers": {"a": {"url": "x"}}}, ["receivers.a.type is missing"]),
