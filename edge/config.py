@@ -6,7 +6,7 @@ Checked before any I/O. Secrets do not stand in the file: it names the environme
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
@@ -16,10 +16,14 @@ from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import signal
 from edge.units import conversion
+from sparkplug.shown_address import shown_address
+from twin.vocabulary.faults import faults_of
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
 BROKERS_MAX = 10
+_BY_ADDRESS = ("variables", "plc")
+_ENTRY = 'write name = { address = "…", unit = "…" }; docs/edges.md says how an address is written'
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
 
@@ -157,3 +161,17 @@ class EdgeConfig(Generic[SourceT]):
     def node(self) -> str:
         """The id of the edge node."""
         return self.broker.node or edge_node(self.machine.name)
+
+
+def faults_in(table: str, kind: Any, error: ValidationError) -> list[str]:
+    """Return the complaints of pydantic about a table as lines with key, value and what is wrong; no address shows a secret."""
+    faults = [dict(fault) for fault in error.errors(include_url=False)]
+    lines = faults_of(faults, kind, f"{table}.", _without_secret)
+    if table not in _BY_ADDRESS:
+        return lines
+    return [f"{line}; {_ENTRY}" if line.endswith(("is missing", "must be a table")) else line for line in lines]
+
+
+def _without_secret(value: object) -> str:
+    is_address = any(mark in str(value) for mark in ("//", "?", "@"))  # of a broker or control; "#500" is a variable's
+    return shown_address(repr(value)) if is_address else repr(value)

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from edge.accelerometer.section import AccelerometerSection
-from edge.adapter import find, modules
+from edge.adapter import Adapter, find, modules
 from edge.chosen import PlcAddresses, Variables
 from edge.config import (
     BrokerSection,
@@ -17,25 +17,26 @@ from edge.config import (
     SignalSection,
     StoreSection,
     ToolChangeSection,
+    faults_in,
 )
-from edge.config_fault import one_line
 from edge.errors import ConfigError
+from twin.vocabulary.faults import report, unknown
 
-_SECTIONS: dict[str, TypeAdapter[Any]] = {
-    "machine": TypeAdapter(MachineSection),
-    "broker": TypeAdapter(BrokerSection),
-    "signals": TypeAdapter(dict[str, SignalSection]),
-    "report": TypeAdapter(ReportSection),
-    "tool_change": TypeAdapter(ToolChangeSection),
-    "store": TypeAdapter(StoreSection),
-    "accelerometer": TypeAdapter(AccelerometerSection),
-    "variables": TypeAdapter(Variables),
-    "plc": TypeAdapter(PlcAddresses),
+_SECTIONS: dict[str, Any] = {
+    "machine": MachineSection,
+    "broker": BrokerSection,
+    "signals": dict[str, SignalSection],
+    "report": ReportSection,
+    "tool_change": ToolChangeSection,
+    "store": StoreSection,
+    "accelerometer": AccelerometerSection,
+    "variables": Variables,
+    "plc": PlcAddresses,
 }
 
 
 def load(path: Path) -> EdgeConfig[Any]:
-    """The edge that this file describes, or a ConfigError of one line."""
+    """The edge that this file describes, or a ConfigError with a line for each fault."""
     try:
         return parse(path.read_text(encoding="utf-8"), path)
     except OSError as error:
@@ -51,20 +52,29 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: is no TOML: {error}") from error
     _check_adapter_is_stated(tables, path)
-    sections = {name: _section(path, name, kind, tables.pop(name, {})) for name, kind in _SECTIONS.items()}
-    chosen: str = sections["machine"].adapter
-    if chosen not in modules():
-        raise ConfigError(f"{path}: machine.adapter = {chosen!r}: no such adapter; there are {', '.join(modules())}")
-    adapter = find(chosen)
-    source = _section(path, chosen, TypeAdapter(adapter.config_model), tables.pop(chosen, {}))
-    if tables:
-        raise ConfigError(f"{path}: [{next(iter(tables))}]: no such table; there are {', '.join(_SECTIONS)} and {chosen}")
+    faults: list[str] = []
+    sections = {name: _section(name, kind, tables.pop(name, {}), faults) for name, kind in _SECTIONS.items()}
+    adapter: Adapter | None = None
+    source: Any = None
+    if (machine := sections["machine"]) is not None:
+        if machine.adapter in modules():
+            adapter = find(machine.adapter)
+            source = _section(machine.adapter, adapter.config_model, tables.pop(machine.adapter, {}), faults)
+        else:
+            faults.append(unknown(f"machine.adapter = {machine.adapter!r}", machine.adapter, modules()))
+    own = () if adapter is None else (adapter.name,)
+    others = tables if adapter is not None else {name: table for name, table in tables.items() if name not in modules()}
+    faults += [unknown(f"[{name}]", name, (*_SECTIONS, *own)) for name in others]
+    if adapter is None or faults:
+        raise ConfigError(report(path, faults, "docs/edges.md"))
     config = EdgeConfig(source=source, path=path, **sections)
     for one in config.chosen:
         try:
             adapter.address(one)
         except ConfigError as error:
-            raise ConfigError(f"{path}: {one.table}.address: {error}") from error
+            faults.append(f"{one.table}.address: {error}")
+    if faults:
+        raise ConfigError(report(path, faults))
     return config
 
 
@@ -79,8 +89,10 @@ def _check_adapter_is_stated(tables: dict[str, Any], path: Path) -> None:
         raise ConfigError(f'{path}: machine.adapter is missing; [{named}] needs adapter = "{named}" below [machine]')
 
 
-def _section(path: Path, name: str, kind: TypeAdapter[Any], raw: object) -> Any:
+def _section(name: str, kind: Any, raw: object, faults: list[str]) -> Any:
+    """Return a table as its model, or None with its faults added to `faults`."""
     try:
-        return kind.validate_python(raw)
+        return TypeAdapter(kind).validate_python(raw)
     except ValidationError as error:
-        raise ConfigError(one_line(path, name, error)) from error
+        faults += faults_in(name, kind, error)
+        return None

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from processors.errors import ConfigurationError
 from sparkplug.shown_address import shown_address
+from twin.vocabulary.faults import faults_of, report
 
 MACHINES = "machines"
 TICKS_MAX = 100_000  # that one jump of event time may bring
@@ -29,6 +30,8 @@ class ProcessorConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     of_one_machine: ClassVar[frozenset[str] | None] = None
     """The keys that a machine may have a value of its own for; None = all."""
+    unshown: ClassVar[frozenset[str]] = frozenset()
+    """The keys below which a secret may stand: no error shows their values."""
     of_the_machine: ClassVar[Mapping[str, str]] = {}
     """Keys of old tables that describe the machine → the section of its file (docs/machine.md) where they belong."""
 
@@ -99,20 +102,26 @@ class Configuration(Generic[C_co]):
         name: str = "",
         reads: "Callable[[Configuration[C_co]], Mapping[str, Any]] | None" = None,
     ) -> None:
-        """Check `table` at once, every machine of it, and read what it names. Raises ConfigurationError naming key, value and
-        model."""
+        """Check `table` at once, every machine of it, and read what it names. Raises ConfigurationError with a line for each
+        fault, which names table, key and value."""
         shared = dict(table or {})
         machines = shared.pop(MACHINES, {})
         if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
             raise ConfigurationError(f"[{name}.{MACHINES}] has to hold one table for each machine")
+        faults: list[str] = []
+        default = _validated(model, shared, name, faults)
+        of_machine = {}
         for machine, own in machines.items():
-            _check_own(model, own, f"{name}.{MACHINES}.{machine}")
+            where = f"{name}.{MACHINES}.{machine}"
+            faults += _common_keys(model, own, where)
+            # a fault of the common values is not repeated for each machine
+            of_machine[machine] = _validated(model, {**shared, **own}, where, faults, None if default is not None else own)
+        if default is None or faults:
+            raise ConfigurationError("\n".join(faults))
         self._name = name
         self._own_keys = {machine: frozenset(own) for machine, own in machines.items()}
-        self.default: C_co = _validated(model, shared, name)
-        self._of_machine: dict[str, C_co] = {
-            machine: _validated(model, {**shared, **own}, f"{name}.{MACHINES}.{machine}") for machine, own in machines.items()
-        }
+        self.default: C_co = default
+        self._of_machine: dict[str, C_co] = {machine: one for machine, one in of_machine.items() if one is not None}
         try:
             self.read: Mapping[str, Any] = {} if reads is None else reads(self)
         except ValueError as error:
@@ -135,27 +144,38 @@ class Configuration(Generic[C_co]):
         return tuple(self._of_machine)
 
 
-def _check_own(model: type[ProcessorConfig], own: Mapping[str, Any], where: str) -> None:
-    """Refuse a value for one machine that holds for all of them, and would not be heeded."""
+def _common_keys(model: type[ProcessorConfig], own: Mapping[str, Any], where: str) -> list[str]:
+    """Return a line for each value of one machine that holds for all of them, and would not be heeded."""
     allowed = model.of_one_machine
-    if allowed is not None and (common := [key for key in own if key in model.model_fields and key not in allowed]):
-        raise ConfigurationError(
-            f"[{where}] {common[0]} = {own[common[0]]!r} holds for all machines; one of them may have its own "
-            + ", ".join(sorted(allowed))
-        )
+    if allowed is None:
+        return []
+    return [
+        f"[{where}] {key} = {value!r} holds for all machines; one of them may have its own {', '.join(sorted(allowed))}"
+        for key, value in own.items()
+        if key in model.model_fields and key not in allowed
+    ]
 
 
-def _validated(model: type[C_co], table: Mapping[str, Any], where: str) -> C_co:
+def _validated(
+    model: type[C_co], table: Mapping[str, Any], where: str, faults: list[str], keys: Collection[str] | None = None
+) -> C_co | None:
+    """Return the table as its model, or None with its faults added to `faults`; keys: those whose faults count, None = all."""
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        known = ", ".join(model.model_fields)
-        said = first["msg"].removeprefix("Value error, ")
-        raise ConfigurationError(
-            f"[{where}] {key} = {shown_address(repr(first['input']))}: {said} (known: {known})" if key else f"[{where}] {said}"
-        ) from error
+        faults += table_faults(model, error, where, keys)
+        return None
+
+
+def table_faults(model: Any, error: ValidationError, where: str, keys: Collection[str] | None = None) -> list[str]:
+    """Return a line for each fault of a table, without the secrets that addresses in it may have."""
+    found = [fault for fault in error.errors(include_url=False) if keys is None or (fault["loc"] and fault["loc"][0] in keys)]
+    unshown: frozenset[str] = getattr(model, "unshown", frozenset())
+    faults = [
+        {key: value for key, value in fault.items() if key != "input" or not unshown.intersection(map(str, fault["loc"][:1]))}
+        for fault in found
+    ]
+    return faults_of(faults, model, f"[{where}] ", lambda value: shown_address(repr(value)))
 
 
 def read_tables(path: Path) -> dict[str, dict[str, Any]]:
@@ -166,7 +186,8 @@ def read_tables(path: Path) -> dict[str, dict[str, Any]]:
         raise ConfigurationError(f"{path}: {error.strerror or error}; give a readable TOML file") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigurationError(f"{path}: {error}") from error
-    for name, table in document.items():
-        if not isinstance(table, dict):
-            raise ConfigurationError(f"{path}: {name} = {table!r} stands outside a table; put it under [<processor>]")
+    if loose := [name for name, table in document.items() if not isinstance(table, dict)]:
+        raise ConfigurationError(
+            report(path, [f"{name} is in no table; put it below its processor, as [thermal]" for name in loose])
+        )
     return document

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError
 from twin.errors import CaseError
 from twin.machine import MachineFile, Section, read_machine
 from twin.runlog import RunLog, read_run
+from twin.vocabulary.faults import faults_of, report
 
 
 class RunKind(StrEnum):
@@ -111,8 +112,8 @@ def read_case(folder: Path) -> Case:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise CaseError(f"{path}: is not TOML: {error}") from None
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise CaseError(f"{path}: {'.'.join(str(part) for part in first['loc'])}: {first['msg']}") from None
+        faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], CaseFile)
+        raise CaseError(report(path, faults)) from None
     for entry in file.runs:
         for named in (entry.file, entry.repeats, entry.program):
             if named is not None and not (path.parent / named).is_file():

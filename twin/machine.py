@@ -18,6 +18,7 @@ from twin.machine_control import ControlSection
 from twin.programs import Settings
 from twin.rotary import outside_name, outside_text
 from twin.rotary_tables import tables_inside
+from twin.vocabulary.faults import faults_of, report
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -309,7 +310,7 @@ class MachineFile(Section):
 def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
     """The machine that `text` describes.
 
-    Raises MachineError naming source, key, value and what would be right: the first fault, and how many more there are.
+    Raises MachineError naming source, key, value and what would be right, with a line for each fault.
     """
     raw: dict[str, Any] = {}
     try:
@@ -320,14 +321,8 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
-        # a key that is not known comes first: the one that is missing is most likely the same, misspelt
-        first, *rest = sorted(_as_written(raw, error), key=lambda fault: fault["type"] != "extra_forbidden")
-        key = ".".join(str(part) for part in _in_file(first["loc"], raw))
-        more = f" (and {len(rest)} more)" if rest else ""
-        if first["type"] == "extra_forbidden":
-            raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
-        said = first["msg"].removeprefix("Value error, ")
-        raise MachineError(f"{source}: {key}: {said}{_shown(first['input'])}{more}") from None
+        faults = [fault | {"loc": _in_file(fault["loc"], raw)} for fault in _as_written(raw, error)]
+        raise MachineError(report(source, faults_of(faults, MachineFile), "docs/machine.md")) from None
     except MachineError as error:
         raise MachineError(f"{source}: {error}") from None
 
@@ -358,10 +353,6 @@ def _in_file(place: tuple[int | str, ...], raw: dict[str, Any]) -> tuple[int | s
         return place
     alike = [number for number, entry in enumerate(raw["effects"]) if _is_learned(entry) is (place[0] == LEARNED)]
     return ("effects", alike[place[1]], *place[2:])
-
-
-def _shown(value: Any) -> str:
-    return f", not {value!r}" if isinstance(value, int | float | str) else ""
 
 
 def read_machine(path: Path) -> MachineFile:

@@ -1,4 +1,4 @@
-"""The command line: one file for each command or group of commands, which only the entry point imports.
+"""The command line: a folder for each group of commands that `cnctwin --help` shows, which only the entry point imports.
 
-They share `extras.py`, `moment.py` and `options.py`.
+A folder's `__init__.py` names its commands (`group.py`); options that several commands have are in `options.py`.
 """

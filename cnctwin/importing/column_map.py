@@ -37,6 +37,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from cnctwin.errors import UsageError
 from cnctwin.importing.run_columns import run_column, unit_of
 from cnctwin.importing.units import conversion, units_for
+from twin.vocabulary.faults import faults_of, report
 
 BYTES_MAX = 1024 * 1024
 ISO_8601 = "ISO 8601"
@@ -147,7 +148,5 @@ def read_map(path: Path) -> ColumnMap:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: is no TOML: {error}") from None
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        why = first["msg"].removeprefix("Value error, ")
-        raise UsageError(f"{path}: {f'{place}: ' if place else ''}{why}") from None
+        faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], ColumnMap)
+        raise UsageError(report(path, faults, "docs/recording.md")) from None

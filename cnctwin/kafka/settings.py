@@ -107,6 +107,7 @@ def settings_of(bootstrap: str | None, path: Path | None, environment: Mapping[s
     try:
         return KafkaSettings.model_validate(table)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(map(str, first["loc"]))
-        raise ConfigurationError(f"{path or 'kafka'}: {key}: {first['msg']} (got {first.get('input')!r:.60})") from None
+        from twin.vocabulary.faults import faults_of, report  # noqa: PLC0415  only where something is wrong
+
+        faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], KafkaSettings)
+        raise ConfigurationError(report(path or "kafka", faults, "docs/kafka.md")) from None

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from processors.config import MACHINES, Configuration, read_tables
+from processors.config import MACHINES, Configuration, read_tables, table_faults
 from processors.errors import ConfigurationError
 from processors.gap.config import Config as GapConfig
 
@@ -96,7 +96,4 @@ def _validated(table: Mapping[str, Any], where: str) -> LoopConfig:
     try:
         return LoopConfig.model_validate(table)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        known = ", ".join(LoopConfig.model_fields)
-        raise ConfigurationError(f"[{where}] {key} = {first['input']!r}: {first['msg']} (known: {known})") from None
+        raise ConfigurationError("\n".join(table_faults(LoopConfig, error, where))) from None

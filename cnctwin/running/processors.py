@@ -1,6 +1,7 @@
 """Processors at work: beside `alerts` the courier that sends what its receivers are to be told, and beside
 `historian` the store that it keeps."""
 
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -15,6 +16,7 @@ from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.metric import NodeId
 from sparkplug.session_files.session_lock import SessionLock
+from sparkplug.topics import NAMESPACE
 
 if TYPE_CHECKING:
     from processors.alerts.courier.thread import Courier
@@ -44,7 +46,20 @@ def process(
         refuse_second(broker, nodes, "end that one first, or give this one other processors or another --group")
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(courier_of(pairs, broker, group))
+        print(started([processor.name for processor, _ in pairs], broker.url, group, machines), file=sys.stderr, flush=True)
         run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits, machines=machines)
+
+
+def started(names: Sequence[str], url: str, group: str, machines: Path | None = None) -> str:
+    """Return the line that says what runs, what it listens to, and which descriptions it has.
+
+    >>> started(["thermal", "gap"], "mqtt://127.0.0.1:1883", "cnc")
+    'started thermal, gap: they listen to the machines of group cnc (spBv1.0/cnc/#) on mqtt://127.0.0.1:1883; Ctrl-C ends them'
+    """
+    they, them = ("they listen", "them") if len(names) > 1 else ("it listens", "it")
+    described = "" if machines is None else f", described in {machines}"
+    where = f"the machines of group {group} ({NAMESPACE}/{group}/#) on {url}{described}"
+    return f"started {', '.join(names)}: {they} to {where}; Ctrl-C ends {them}"
 
 
 @contextmanager

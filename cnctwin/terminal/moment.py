@@ -7,8 +7,7 @@ from zoneinfo import ZoneInfo
 
 from cnctwin.errors import UsageError
 
-FORMS = "2026-11-22T06:00 (UTC where no zone stands), ms since 1970, or -15m for a quarter of an hour ago (s, m, h, d)"
-TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
+FORMS = "2026-11-22T06:00 (UTC unless it names a zone), ms since 1970, or -15m for a quarter of an hour ago (s, m, h, d)"
 _AGO = re.compile(r"-(\d+(?:\.\d+)?)([smhd])")
 _LENGTH = re.compile(r"(\d+)(ms|s|m|h|d)")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -32,6 +31,23 @@ def moment_ms(text: str, option: str = "", now_ms: int | None = None) -> int:
     except ValueError:
         raise UsageError(f"{f'{option} ' if option else ''}{text!r} is no moment; write {FORMS}") from None
     return round((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp() * 1000)
+
+
+def stretch_ms(begin: str | None, end: str | None, lasts_ms: int | None = None, *, now_ms: int | None = None) -> tuple[int, int]:
+    """A stretch of time as --from and --to name it; the end is not in it. Raises UsageError.
+
+    Without `end` it lasts until now; without `begin` it lasts `lasts_ms`, else it starts at the beginning of all data.
+
+    >>> stretch_ms("1000", "2000"), stretch_ms(None, None, now_ms=9000), stretch_ms(None, "9000", 500)
+    ((1000, 2000), (0, 9000), (8500, 9000))
+    """
+    now_ms = time.time_ns() // 1_000_000 if now_ms is None else now_ms
+    to_ms = now_ms if end is None else moment_ms(end, "--to", now_ms)
+    unsaid_ms = 0 if lasts_ms is None else to_ms - lasts_ms
+    from_ms = unsaid_ms if begin is None else moment_ms(begin, "--from", now_ms)
+    if to_ms <= from_ms:
+        raise UsageError(f"--to {end or 'now'} is not after --from {begin or from_ms}; give a stretch of time")
+    return from_ms, to_ms
 
 
 def length_ms(text: str, option: str = "--every") -> int:

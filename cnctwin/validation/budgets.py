@@ -6,7 +6,8 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
 
 from cnctwin.errors import UsageError
-from processors.config import read_tables
+from processors.config import read_tables, table_faults
+from twin.vocabulary.faults import report
 
 TABLE = "validation"
 
@@ -47,7 +48,4 @@ def budgets_of(table: dict[str, Any], source: str) -> Budgets:
     try:
         return Budgets.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        known = ", ".join(Budgets.model_fields)
-        raise UsageError(f"{source}: [{TABLE}] {key} = {first['input']!r}: {first['msg']} (known: {known})") from None
+        raise UsageError(report(source, table_faults(Budgets, error, TABLE), "docs/validation.md")) from None

@@ -23,6 +23,7 @@ class Figure:
     quantity: temperature, force, …; measure: mae, rmse, mape, r, …; on: axis or program, "" where there is one only
     low, high: 95 % by block bootstrap, None where there are too few blocks that are independent
     samples, hours, blocks: what it rests on; basis: what was compared with what; reason: why there is no figure
+    hours_needed: of hours, where there are too few of them
     """
 
     quantity: str
@@ -39,6 +40,7 @@ class Figure:
     on: str = ""
     basis: str = ""
     reason: str | None = None
+    hours_needed: float | None = None
 
     @property
     def name(self) -> str:

@@ -6,7 +6,7 @@ the machine states F_r / F_t: right where one tooth cuts at a time; the forces o
 spindle changes its speed are left out, since its load is its inertia then.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,11 +83,11 @@ def _figure(found: Compared, evidence: Evidence, grid: Grid, budgets: Budgets, b
     shown = count / max(int(cutting.sum()), 1)
     if cut_s < budgets.force_cutting_s_min or shown < SHOWN_MIN:
         why = f"{cut_s:.3g} s of cutting with both forces; {budgets.force_cutting_s_min:g} s are needed"
+        needed: float | None = budgets.force_cutting_s_min / 3600.0
         if cut_s >= budgets.force_cutting_s_min:
-            why = f"the twin has a force in {100 * shown:.0f} % of the windows that cut only"
-        return Figure(
-            QUANTITY, "mape", "%", budget, Verdict.TOO_LITTLE, samples=count, hours=cut_s / 3600.0, basis=basis, reason=why
-        )
+            why, needed = f"the twin has a force in {100 * shown:.0f} % of the windows that cut only", None
+        few = Figure(QUANTITY, "mape", "%", budget, Verdict.TOO_LITTLE, samples=count, hours=cut_s / 3600.0, basis=basis)
+        return replace(few, reason=why, hours_needed=needed)
     error = np.where(both, 100.0 * np.abs(found.twin - found.truth) / np.where(both, found.truth, 1.0), np.nan)
     sums = block_sums(np.column_stack([error, np.where(both, 1.0, np.nan)]), block_samples(error))
     one = bootstrapped(sums, lambda s: s[:, 0] / s[:, 1])

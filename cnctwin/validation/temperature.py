@@ -4,7 +4,7 @@ Where the store holds what the twin published, that is judged; else the twin run
 measured temperature, so it is right for a while at the beginning: a time constant of the spindle, a quarter to a whole hour.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,7 +89,10 @@ def _figure(measure: tuple[str, str, float], seen: _Seen, budgets: Budgets) -> F
     if not count or seen.hours < budgets.hours_min:
         share = f", and {100 * budgets.hour_share_min:g} % of one hour" if is_hour else ""
         least = f"{seen.hours:.2g} h were seen; {budgets.hours_min:g} h are needed{share}"
-        return Figure(QUANTITY, name, unit, budget, Verdict.TOO_LITTLE, samples=count, hours=told, basis=seen.basis, reason=least)
+        few = Figure(
+            QUANTITY, name, unit, budget, Verdict.TOO_LITTLE, samples=count, hours=seen.hours, basis=seen.basis, reason=least
+        )
+        return replace(few, hours_needed=budgets.hours_min if seen.hours < budgets.hours_min else None)
     found = _interval(error, power)
     verdict = judged(found.value, budget)
     return Figure(

@@ -14,6 +14,7 @@ from rich.table import Table
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.terminal.spinner import working
+from cnctwin.terminal.still_needed import StillNeeded
 from cnctwin.validation.budgets import TABLE, Budgets, budgets_of, tables_of
 from cnctwin.validation.cycle_time import Cycle, Cycles, texts_of
 from cnctwin.validation.cycles import cycle_of_run, cycles_of, names_of
@@ -72,10 +73,12 @@ def validate(
         reason = retraining(nights)
         told = {**_head(night), "machine": asked.machine, "nights": nights, "retrain": False, "retrain_reason": reason}
         told["over_in_a_row"] = {}
+    missing = still_missing(figures, found[0][0].from_s, found[0][0].to_s)
     if as_json:
-        sys.stdout.write(json.dumps({**night, "retrain": told["retrain"], "retrain_reason": told["retrain_reason"]}) + "\n")
+        retrain = {name: told[name] for name in ("retrain", "retrain_reason")}
+        sys.stdout.write(json.dumps({**night, **retrain, "still_missing": missing}) + "\n")
     else:
-        _print(night, figures, told, console)
+        _print(night, figures, missing, told, console)
     if broker is not None:
         publish(told, broker, asked.group, session_file)
     return 1 if night["verdict"] == Verdict.OVER else 0
@@ -125,7 +128,9 @@ def _of_store(asked: ValidationRequest, twin: Twin, budgets: Budgets, say: Any) 
         store.close()
 
 
-def _print(night: Mapping[str, Any], figures: Sequence[Figure], told: Mapping[str, Any], console: Console) -> None:
+def _print(
+    night: Mapping[str, Any], figures: Sequence[Figure], missing: Sequence[str], told: Mapping[str, Any], console: Console
+) -> None:
     table = Table(title=f"{night['machine']}, night of {night['night']}: {night['verdict']}", title_justify="left")
     for column in ("what", "value", "95 %", "budget", "rests on", "verdict"):
         table.add_column(column, justify="right" if column in ("value", "95 %", "budget") else "left", overflow="fold")
@@ -135,13 +140,29 @@ def _print(night: Mapping[str, Any], figures: Sequence[Figure], told: Mapping[st
         rests = "–" if not one.samples else f"{one.samples} in {one.hours:.3g} h, {one.blocks} blocks"
         table.add_row(one.key, value, interval, f"{'≥' if one.measure == 'r' else '≤'} {one.budget:g}", rests, str(one.verdict))
     console.print(table)
-    for line in _reasons(figures):
+    for line in _reasons([one for one in figures if one.value is not None]):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if missing:
+        console.print("\n[bold]still missing[/]")
+    for line in missing:
+        console.print(f"· {line}", markup=False, highlight=False, soft_wrap=True)
     if (clock := night["clock"]) is not None:
         sure = f"(correlation {clock['r']:.3f}, elsewhere {clock['rival']:.3f})"
         console.print(f"the truth's clock: {clock['offset_s']:g} s, by {clock['by']} {sure}", highlight=False, soft_wrap=True)
     if told["retrain"]:
         console.print(f"retrain: {told['retrain_reason']}", style="bold red", markup=False, highlight=False, soft_wrap=True)
+
+
+def still_missing(figures: Sequence[Figure], from_s: float, to_s: float) -> list[str]:
+    """Return the plan for what could not be judged: what was seen, what is needed and when that will be; else the reason."""
+    lines: dict[str, list[str]] = {}
+    for one in figures:
+        if one.value is None and one.hours_needed is not None:
+            needed = StillNeeded("", one.hours, one.hours_needed, (to_s - from_s) / 3600.0, to_s)
+            lines.setdefault(needed.sentence(), []).append(one.key)
+        elif one.value is None:
+            lines.setdefault(f": {one.reason}", []).append(one.key)
+    return [f"{', '.join(keys)}{text}" for text, keys in lines.items()]
 
 
 def _reasons(figures: Sequence[Figure]) -> list[str]:

@@ -3,6 +3,8 @@
 That a standing spindle shakes less than a turning one needs no estimate: where the speed is known, only a turning spindle counts.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from cnctwin.validation.block_bootstrap import block_samples, block_sums, bootstrapped
@@ -35,7 +37,8 @@ def judged_vibration(evidence: Evidence, budgets: Budgets) -> list[Figure]:
     seconds = count * EVERY_S
     if seconds < budgets.vibration_s_min:
         why = f"{seconds:g} s with both; {budgets.vibration_s_min:g} s are needed"
-        return [_none(Verdict.TOO_LITTLE, budgets, count, basis, why)]
+        few = _none(Verdict.TOO_LITTLE, budgets, count, basis, why)
+        return [replace(few, hours_needed=budgets.vibration_s_min / 3600.0)]
     one, other = np.where(both, one, np.nan), np.where(both, other, np.nan)
     for values, what in ((one, "estimate"), (other, "reference")):
         if float(np.nanstd(values)) <= CONSTANT * max(float(np.nanmax(np.abs(values))), CONSTANT):

@@ -22,6 +22,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from processors.wall_clock import DAYS, TimeOfDay, TimeZoneName, minutes
+from twin.vocabulary.faults import faults_of, report
 
 DAY_MIN = 1440
 BYTES_MAX = 1_000_000
@@ -170,7 +171,7 @@ def _refuse_overlap(spans: list[tuple[int, int, str]], machine: str, when: str) 
 
 
 def read_calendar_file(path: Path) -> CalendarFile:
-    """Return the calendar in a file. Raises ValueError, in one line that names file, key and value."""
+    """Return the calendar in a file. Raises ValueError, with a line for each fault that names key and value."""
     try:
         size = path.stat().st_size
         if size > BYTES_MAX:
@@ -183,7 +184,5 @@ def read_calendar_file(path: Path) -> CalendarFile:
     try:
         return CalendarFile.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        said = first["msg"].removeprefix("Value error, ")
-        raise ValueError(f"calendar {path}: {key} = {first['input']!r}: {said}" if key else f"calendar {path}: {said}") from None
+        faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], CalendarFile)
+        raise ValueError(report(f"calendar {path}", faults)) from None

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from processors.config import Configuration, ProcessorConfig, read_tables
 from processors.description_folder import DescriptionFolder
-from processors.discovery import AnyProcessor, find, module_of
-from processors.errors import ConfigurationError, UnknownProcessorError
+from processors.discovery import AnyProcessor, find, modules
+from processors.errors import ConfigurationError
 from processors.running.health import node_metrics
 from processors.running.ports import Recorder
 from processors.running.runner import Runner
@@ -21,6 +21,7 @@ from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 from sparkplug.topics import uncommanded_filters
 from sparkplug.transport.loop import Loop
+from twin.vocabulary.faults import report, unknown
 from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import RESERVED_MACHINES
 
@@ -106,23 +107,19 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> list[Co
     Raises UnknownProcessorError, ConfigurationError.
     """
     tables = {} if config_path is None else read_tables(config_path)
-    for table in tables:
-        if table not in OTHERS:
-            _check_table(table, config_path)
+    known = (*modules(), *OTHERS)
+    # A table of a processor that does not run is known by its name, and not imported.
+    faults = [unknown(f"[{table}]", table, known) for table in tables if table not in known]
     processors = [find(name) for name in dict.fromkeys(names)]
-    try:
-        found = [(processor, processor.configured(tables.get(processor.name))) for processor in processors]
-    except ConfigurationError as error:
-        raise ConfigurationError(f"{config_path}: {error}") from error
+    found = []
+    for processor in processors:
+        try:
+            found.append((processor, processor.configured(tables.get(processor.name))))
+        except ConfigurationError as error:
+            faults += str(error).split("\n")
+    if faults:
+        raise ConfigurationError(report(config_path, faults, "docs/processors.md"))
     for _, configuration in found:
         for line in configuration.belongs_elsewhere():
             _log.warning("%s: %s", config_path, line)
     return found
-
-
-def _check_table(table: str, config_path: Path | None) -> None:
-    """Refuse a table that is for no processor; one that does not run is not imported. Raises ConfigurationError."""
-    try:
-        module_of(table)
-    except UnknownProcessorError as error:
-        raise ConfigurationError(f"{config_path}: [{table}]: {error}") from error

@@ -320,7 +320,7 @@ def test_a_job_goes_through_the_command_of_its_service_under_the_rules(running: 
         said = service.communicate(timeout=30)[1]
     assert job, said
     assert (job["state"], job["machine"]) == ("failed", "small")
-    assert job["reason"].startswith("empty/case.toml: runs: Field required")
+    assert job["reason"].startswith("empty/case.toml: runs is missing")
     kept = {path.name for path in (running.home / "state/jobs/jobs/d").iterdir()}
     assert kept >= {"request.json", "state.json", "outcome.json", "child.log"}
     assert service.returncode == 0, said

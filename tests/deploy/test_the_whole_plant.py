@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cnctwin.commands.alerts import alerts_app
+from cnctwin.commands.see.alerts import alerts_app
 from cnctwin.running.processors import process
 from processors.running.runtime import configured
 from sparkplug.datatype import DataType

@@ -38,8 +38,8 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
     ("text", "expected"),
     [
         ("[machine]\nname = 'a/b'", "vmc.toml: machine.name = 'a/b': does not match the pattern ^[^/+#]+$"),
-        ("[machine]\nnam = 'a'", "vmc.toml: machine.nam: no such key; remove it, or see the sample configuration"),
-        ("[machine]\nadapter = 'fagor'", "vmc.toml: machine.adapter = 'fagor': no such adapter; there are "),
+        ("[machine]\nnam = 'a'", "vmc.toml: machine.nam is not known; did you mean name? See docs/edges.md"),
+        ("[machine]\nadapter = 'fagor'", "vmc.toml: machine.adapter = 'fagor' is not known; known are focas, "),
         ("[machine]\nlost_after_s = 'soon'", "vmc.toml: machine.lost_after_s = 'soon': is no number; write one without quotes"),
         ("[mtconnect]\nurl = 'agent:5000'", "vmc.toml: mtconnect.url = 'agent:5000': is no http:// or https:// address"),
         ("[mtconnect]\ncount = 0", "vmc.toml: mtconnect.count = 0: must be 1 or more"),
@@ -60,8 +60,8 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
             'vmc.toml: machine.adapter is missing; [focas] needs adapter = "focas" below [machine]',
         ),
         ("[opcua]", 'vmc.toml: machine.adapter is missing; [opcua] needs adapter = "opcua" below [machine]'),
-        ("[machine]\nadapter = 'focas'\n[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, "),
-        ("[mtconnect]\n[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, "),
+        ("[machine]\nadapter = 'focas'\n[opcua]", "vmc.toml: [opcua] is not known; known are machine, broker, signals, "),
+        ("[mtconnect]\n[opcua]", "vmc.toml: [opcua] is not known; known are machine, broker, signals, "),
         (
             "[broker]\nurl = 'mqtt://a'\nurls = ['mqtt://b']",
             "vmc.toml: broker: has url and urls; put all brokers into urls",
@@ -70,7 +70,7 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
             "[broker]\nurls = ['mqtt://b', 'mqtt://b']",
             "vmc.toml: broker: urls names a broker twice",
         ),
-        ("machine = 3", "vmc.toml: machine = 3: is no table; write it as [machine], with its keys below"),
+        ("machine = 3", "vmc.toml: machine: must be a table"),
         ("[machine", "vmc.toml: is no TOML: "),
     ],
 )
@@ -79,6 +79,18 @@ def test_a_mistake_is_one_line_with_the_way_out(text: str, expected: str) -> Non
         parse(text, FILE)
     assert str(caught.value).startswith(expected)
     assert "\n" not in str(caught.value)
+
+
+def test_all_mistakes_of_a_file_are_told_at_once() -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse("[machine]\nname = 'a'\n[mtconnect]\ncount = 0\nur = 'x'\n[signals.feed_mm_min]\ndeadbnd = 1\n[repot]\n", FILE)
+    assert str(caught.value).split("\n  ") == [
+        "vmc.toml: 4 faults; see docs/edges.md",
+        "signals.feed_mm_min.deadbnd is not known; did you mean deadband?",
+        "mtconnect.ur is not known; did you mean url?",
+        "mtconnect.count = 0: must be 1 or more",
+        "[repot] is not known; did you mean report?",
+    ]
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:

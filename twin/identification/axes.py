@@ -17,7 +17,7 @@ from twin.identification.axis_parameters import (
 )
 from twin.identification.cutting_fit import force_of
 from twin.identification.disturbance_fit import fit_disturbance
-from twin.identification.estimate import INTERVAL_Z, Estimate
+from twin.identification.estimate import INTERVAL_Z, KNOWN_MIN, Estimate
 from twin.machine import AddedEffect, MachineFile
 from twin.regimes import axis_regimes
 from twin.simulator.recorded import noise_of
@@ -170,7 +170,7 @@ def _unknown(letter: str, found: AxisFit, forced: bool) -> list[str]:
     said = [
         f"{_path(letter, p, False)}: these runs do not excite it; the stated value and its uncertainty stand"
         for p, known in zip(found.model.parameters, found.found.known, strict=True)
-        if known < 0.5
+        if known <= KNOWN_MIN
     ]
     if not forced:
         said.append(

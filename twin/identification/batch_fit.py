@@ -3,17 +3,18 @@
     min Σ ρ(r_i(θ)²) + Σ (θ_j / σ_j)²,   ρ(z) = 2 f² (√(1 + z / f²) − 1),  f = 3 standard deviations
 
 scipy's trust-region search does the steps; all finite differences of a step are one batch. The stated uncertainty of a parameter
-is its prior, so what the recordings do not say stays where it was, and is said to be so.
+is its prior. A parameter that the recordings tell less of than the prior is held at 0, which is what was stated, and the others
+are fitted once more beside it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from twin.identification.estimate import clustered_covariance
+from twin.identification.estimate import KNOWN_MIN, clustered_covariance
 
 Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
@@ -67,7 +68,26 @@ def fit(residuals: Residuals, sigma: Floats, limit: Floats, blocks: NDArray[np.i
     covariance = clustered_covariance(slope, found.fun[data] * weight, blocks, np.diag(1.0 / sigma**2))
     information = slope.T @ slope + np.diag(1.0 / sigma**2)
     known = 1.0 - np.clip(np.diag(np.linalg.pinv(information, hermitian=True)) / sigma**2, 0.0, 1.0)
-    return Fit(found.x, covariance, known, float(np.sqrt(np.mean(found.fun[data] ** 2))), evaluations)
+    done = Fit(found.x, covariance, known, float(np.sqrt(np.mean(found.fun[data] ** 2))), evaluations)
+    return done if np.all(known > KNOWN_MIN) else _held(done, residuals, sigma, limit, blocks)
+
+
+def _held(found: Fit, residuals: Residuals, sigma: Floats, limit: Floats, blocks: NDArray[np.intp]) -> Fit:
+    """Return the fit with what the recordings do not tell at what was stated, and its stated uncertainty."""
+    free = found.known > KNOWN_MIN
+    theta, covariance = np.zeros(len(sigma)), np.diag(sigma**2)
+    if not free.any():
+        return replace(found, theta=theta, covariance=covariance)
+
+    def with_held(told: Floats) -> Floats:
+        every = np.zeros((len(told), len(sigma)))
+        every[:, free] = told
+        return residuals(every)
+
+    again = fit(with_held, sigma[free], limit[free], blocks, np.clip(found.theta[free], -limit[free], limit[free]))
+    theta[free] = again.theta
+    covariance[np.ix_(free, free)] = again.covariance
+    return replace(found, theta=theta, covariance=covariance, rms=again.rms, evaluations=found.evaluations + again.evaluations)
 
 
 def time_blocks(t_s: Floats, block_s: float) -> NDArray[np.intp]:

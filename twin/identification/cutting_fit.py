@@ -8,12 +8,13 @@
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.identification.batch_fit import Fit, time_blocks
-from twin.identification.estimate import clustered_covariance
+from twin.identification.estimate import KNOWN_MIN, clustered_covariance
 from twin.machine import MachineFile, SpindleDrive, Tool
 from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
 from twin.runlog import RunLog
@@ -28,6 +29,8 @@ BLOCK_S = 0.25
 def linear_fit(regressors: Floats, measured: Floats, noise: float, prior: tuple[Floats, Floats], blocks: NDArray[np.intp]) -> Fit:
     """Weighted linear least squares with a Gaussian prior (mean, sigma), each (p,).
 
+    A parameter that the samples tell less of than the prior stays at its mean, and the others are fitted once more beside it.
+
     regressors: (n, p); measured: (n,); noise: standard deviation of each sample
     """
     mean, sigma = prior
@@ -37,7 +40,17 @@ def linear_fit(regressors: Floats, measured: Floats, noise: float, prior: tuple[
     residuals = measured / noise - rows @ theta
     covariance = clustered_covariance(rows, residuals, blocks, precision)
     known = 1.0 - np.clip(np.diag(covariance) / sigma**2, 0.0, 1.0)
-    return Fit(np.asarray(theta, dtype=np.float64), covariance, known, float(np.sqrt(np.mean(residuals**2))), 1)
+    free = known > KNOWN_MIN
+    found = Fit(np.asarray(theta, dtype=np.float64), covariance, known, float(np.sqrt(np.mean(residuals**2))), 1)
+    if free.all():
+        return found
+    held: Floats = np.array(mean, dtype=np.float64)
+    covariance = np.diag(sigma**2)
+    if free.any():
+        left = measured - regressors[:, ~free] @ mean[~free]
+        again = linear_fit(regressors[:, free], left, noise, (mean[free], sigma[free]), blocks)
+        held[free], covariance[np.ix_(free, free)] = again.theta, again.covariance
+    return replace(found, theta=held, covariance=covariance)
 
 
 def fit_cutting(
@@ -72,7 +85,8 @@ def force_of(machine: MachineFile, log: RunLog) -> MillingForce | None:
 def with_cutting(tool: Tool, fitted: Fit) -> Tool:
     """The tool with the identified coefficients."""
     tangential, radial = (float(v) for v in fitted.theta)
-    return tool.model_copy(update={"tangential_coefficient_n_per_mm2": tangential, "radial_ratio": radial / tangential})
+    ratio = radial / tangential if fitted.known[1] > KNOWN_MIN else tool.radial_ratio
+    return tool.model_copy(update={"tangential_coefficient_n_per_mm2": tangential, "radial_ratio": ratio})
 
 
 def fit_spindle(
@@ -103,5 +117,5 @@ def fit_spindle(
 
 def with_spindle(spindle: SpindleDrive, fitted: Fit) -> SpindleDrive:
     """The drive with the identified efficiency and idle power."""
-    efficiency = min(1.0, 1.0 / float(fitted.theta[0]))
+    efficiency = min(1.0, 1.0 / float(fitted.theta[0])) if fitted.known[0] > KNOWN_MIN else spindle.efficiency
     return spindle.model_copy(update={"efficiency": efficiency, "idle_power_kw": max(0.0, float(fitted.theta[1]))})

@@ -10,6 +10,8 @@ from twin.rotary import Letters, outside_name, outside_path, outside_unit
 Floats = NDArray[np.float64]
 INTERVAL_Z = 1.959963984540054
 """Of a 95 % interval."""
+KNOWN_MIN = 0.5
+"""Part of the information that has to come from the recordings; below it the stated value stays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class Estimate:
     @property
     def identifiable(self) -> bool:
         """Return True where the recordings say more about it than was known before."""
-        return self.known_by > 0.5
+        return self.known_by > KNOWN_MIN
 
     def in_own_units(self, rotary: Letters) -> "Estimate":
         """Return it in degrees and N m where it is of one of the rotary axes.

@@ -20,7 +20,7 @@ from twin.heat.run import Warming
 from twin.identification.axes import identified_axes
 from twin.identification.batch_fit import Fit
 from twin.identification.cutting_fit import fit_cutting, fit_spindle, force_of, with_cutting, with_spindle
-from twin.identification.estimate import INTERVAL_Z, Estimate
+from twin.identification.estimate import INTERVAL_Z, KNOWN_MIN, Estimate
 from twin.identification.idle_fit import fit_idle
 from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
 from twin.machine import MachineFile, SpindleDrive
@@ -78,10 +78,8 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     machine = _spindle(machine, fits, known, unknown)
     progress("heat")
     machine = _heat(machine, fits, known, unknown)
-    of_constants = [e for e in known if not e.path.endswith(("_asymmetry", "_delay"))]
-    uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in of_constants}
-    told = {e.path: _relative(e) for e in of_constants if e.identifiable}
-    machine = with_fitted(machine.model_copy(update={"uncertainty": uncertainty}), told)
+    told = {e.path: _relative(e) for e in known if e.identifiable and not e.path.endswith(("_asymmetry", "_delay"))}
+    machine = with_fitted(machine.model_copy(update={"uncertainty": {**machine.uncertainty, **told}}), told)
     progress("checking")
     judged = case.of(role="check") or fits
     gaps = free_run_gap(machine, judged, case.repeats())
@@ -214,9 +212,10 @@ def _idle(
     stated = spindle.idle_power_kw
     prior = stated_uncertainty(machine, "spindle.idle_power_kw") * stated
     known_by = 1.0 - min(1.0, (found.deviation_kw / prior) ** 2) if prior > 0.0 else 1.0
-    known.append(estimate("spindle.idle_power_kw", found.power_kw, found.deviation_kw, "kW", stated, known_by))
-    if known_by <= 0.5:
+    if known_by <= KNOWN_MIN:
+        known.append(estimate("spindle.idle_power_kw", stated, prior, "kW", stated, known_by))
         return machine
+    known.append(estimate("spindle.idle_power_kw", found.power_kw, found.deviation_kw, "kW", stated, known_by))
     return machine.model_copy(update={"spindle": spindle.model_copy(update={"idle_power_kw": found.power_kw})})
 
 
@@ -256,5 +255,5 @@ def _say_thermal(found: Fit, free: list[str], unknown: list[str], constant_s: fl
     unknown.extend(
         f"thermal.{name}: these runs do not say; a step of speed and a cool-down of {2.0 * constant_s / 60.0:.0f} min would"
         for i, name in enumerate(free)
-        if found.known[i] < 0.5
+        if found.known[i] <= KNOWN_MIN
     )

@@ -22,7 +22,8 @@ def kernel_folder() -> Path:
     folder = Path(os.environ.get("CNCTWIN_KERNELS") or Path(cache_home) / "cnctwin" / "kernels")
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if folder.stat().st_uid == os.getuid() and os.access(folder, os.W_OK):
+        own = getattr(os, "getuid", None)  # Windows has no owner to compare; the folder is below the user's own
+        if (own is None or folder.stat().st_uid == own()) and os.access(folder, os.W_OK):
             return folder
     except OSError:
         pass

@@ -50,9 +50,8 @@ def recorded_run(run: RunLog, physics: Physics, tick_s: float = 1.0) -> Recorded
 
 def recorded_of(told: Mapping[str, Samples], physics: Physics, tick_s: float = 1.0, source: str = "the recording") -> Recorded:
     """Signals by name, with the physics beside them. Raises ResidualError where one that is needed is missing."""
-    for name in (SPEED, LOAD, MEASURED):
-        if name not in told:
-            raise ResidualError(f"{source}: there is no {name}, without which no residual can be learned")
+    if missing := [name for name in (SPEED, LOAD, MEASURED) if name not in told]:
+        raise ResidualError(f"{source}: there is no {', no '.join(missing)}, without which no residual can be learned")
     if AMBIENT not in told:
         if physics.ambient_temp_c is None:
             raise ResidualError(f"{source}: there is no {AMBIENT}; configure ambient_temp_c in [thermal], as the twin has it")

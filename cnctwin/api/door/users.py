@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 
 from cnctwin.api.door.role import Role
 from cnctwin.errors import UsageError
+from twin.vocabulary.faults import faults_of, report
 
 TOKEN_CHARACTERS_MIN = 16
 USERS_MAX = 1000
@@ -56,9 +57,8 @@ def read_users(path: Path) -> tuple[User, ...]:
     try:
         entries = _Entries.model_validate(told).root
     except ValidationError as error:
-        first = error.errors(include_input=False, include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"--users {path}: {where[:80]}: {first['msg']}; see docs/api.md") from None
+        faults = [dict(fault) for fault in error.errors(include_input=False, include_url=False)]
+        raise UsageError(report(f"--users {path}", faults_of(faults, _Entries, shown=None), "docs/api.md")) from None
     users = tuple(User(name, Role[one.role.upper()], one.token) for name, one in entries.items())
     for user in users:
         if not _NAME.fullmatch(user.name):

@@ -17,6 +17,7 @@ from cnctwin.machines.place import machines_folder
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.models.registry import add, shelf
 from cnctwin.terminal.spinner import working
+from cnctwin.terminal.still_needed import DATED_S, StillNeeded
 from cnctwin.training.residual.recording import from_files, from_store
 from processors.config import Configuration, read_tables
 from processors.errors import ConfigurationError
@@ -62,8 +63,8 @@ def train_residual(wanted: Wanted, asked: TrainingSettings, out: Path, *, as_jso
             recorded = _recorded(wanted, physics, say)
             if (hours := recorded.cutting_hours) < wanted.hours_min:
                 raise UsageError(
-                    f"{hours:.1f} h of cutting in {recorded.hours:.1f} h; {wanted.hours_min:g} h are asked for: record more, or "
-                    f"allow fewer with --hours-min {max(hours - 0.05, 0.0):.1f}"
+                    f"{wanted.machine}: not enough to train on yet\n  {_needed(recorded, wanted.hours_min).sentence()}\n"
+                    f"  record on, or allow fewer with --hours-min {max(hours - 0.05, 0.0):.1f}"
                 )
             about = Trained(
                 machine=wanted.machine,
@@ -94,6 +95,13 @@ def physics_of(config: Path | None, machine: str, machines: Path | None = None) 
         raise UsageError(str(error)) from None
     heat = described(own, description)
     return Physics.of(heat.machine, own.ambient_temp_c, heat.version)
+
+
+def _needed(recorded: Recorded, hours_min: float) -> StillNeeded:
+    """Return how much cutting is still needed; the rate is that of the calendar where the times have a date."""
+    begin_s, end_s = float(recorded.t_s[0]), float(recorded.t_s[-1])
+    over_h = (end_s - begin_s) / 3600.0 if begin_s > DATED_S else recorded.hours
+    return StillNeeded("cutting (the spindle turns and the axes feed)", recorded.cutting_hours, hours_min, over_h, end_s)
 
 
 def _recorded(wanted: Wanted, physics: Physics, say: Any) -> Recorded:

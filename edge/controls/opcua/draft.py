@@ -10,8 +10,7 @@ from urllib.parse import parse_qsl
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig
-from edge.config_fault import one_line
+from edge.config import EdgeConfig, faults_in
 from edge.controls.opcua.alarm_samples import Heard
 from edge.controls.opcua.check import alarm_rows, read_all, read_events, run
 from edge.controls.opcua.config import Config, OpcUaConfig
@@ -23,6 +22,7 @@ from edge.sample import EMPTY, SampleSet
 from edge.signals import signal
 from edge.sweep import Sweep
 from edge.units import conversion
+from twin.vocabulary.faults import report
 
 SHOWN_MAX, SHOWN_ALARMS_MAX = 200, 20
 _NO_FILE = Path("the address")  # what messages name in place of a file
@@ -68,7 +68,7 @@ def _config(url: str) -> Config:
     try:
         return EdgeConfig(path=_NO_FILE, source=OpcUaConfig.model_validate(given | {"url": address, "map": ""}))
     except ValidationError as error:
-        raise ConfigError(one_line(_NO_FILE, "opcua", error)) from error
+        raise ConfigError(report(_NO_FILE, faults_in("opcua", OpcUaConfig, error))) from error
 
 
 async def _drafted(config: Config, device: str) -> str:

@@ -14,6 +14,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from twin.vocabulary.faults import faults_of, report
+
 ENGLISH = "en"
 FILE_BYTES_MAX = 200_000
 SUFFIX = ".toml"
@@ -99,8 +101,8 @@ def language_in(path: Path) -> Language:
     except OSError as error:
         raise ValueError(f"language {path}: {error.strerror or error}; give a readable TOML file") from error
     except ValidationError as error:
-        first = error.errors(include_input=False)[0]
-        raise ValueError(f"language {path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        faults = [dict(fault) for fault in error.errors(include_input=False, include_url=False)]
+        raise ValueError(report(f"language {path}", faults_of(faults, Language, shown=None))) from error
     except ValueError as error:
         raise ValueError(f"language {path}: {error}") from error
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from cnctwin.challenge import losses
 from cnctwin.challenge.contest import Losses, outcome
 from cnctwin.challenge.stretch import read_stretch, stretch_of_store
-from cnctwin.commands.model import model_app
+from cnctwin.commands.learn.model import model_app
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.models import golden, registry
@@ -136,7 +136,7 @@ def test_the_same_again_does_not_win_and_is_not_promoted_without_a_reason(own: S
     same = seeded(own, 3)
     code, text = model("compare", "residual", "vmc", same, "--runs", "day.parquet", "--promote")
     assert code == 1 and "does not win: the difference is none for sure" in text
-    with pytest.raises(UsageError, match=r"has not won against .*: compare it, or say --because why"):
+    with pytest.raises(UsageError, match=r"has not won against .*: compare it, or give --why"):
         model("promote", "residual", "vmc", same)
     assert model("promote", "residual", "vmc", same, "--because", "the sensor was changed")[0] == 0
     pointer = own.pointer()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.commands.alerts import alerts_app, duration_s
+from cnctwin.commands.see.alerts import alerts_app, duration_s
 from cnctwin.errors import UsageError
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.thread import Courier

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cnctwin.commands.figures.command import figures
+from cnctwin.commands.see.figures.command import figures
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store

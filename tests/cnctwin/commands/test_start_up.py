@@ -1,11 +1,16 @@
 """The command line before a command is chosen: quick, and with nothing of what the extras bring."""
 
 import importlib.util
+import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+
+import cnctwin.commands
+from cnctwin.cli import GROUPS
 
 HEAVY = (
     "numpy",
@@ -43,12 +48,96 @@ def _modules_after(text: str) -> set[str]:
 def test_the_entry_point_loads_no_command_before_it_is_asked_for() -> None:
     loaded = _modules_after("import cnctwin.cli, sys; print(*sys.modules, sep='\\n')")
     assert "typer" in loaded
-    assert not [name for name in loaded if name.startswith(("cnctwin.commands.", "sparkplug.host", "pydantic"))]
+    groups = {group.folder for group in GROUPS}
+    ours = {name for name in loaded if name.startswith(("cnctwin.commands.", "sparkplug.host", "pydantic"))}
+    assert ours == {"cnctwin.commands.group", *groups}
+
+
+NO_COMMAND = """
+import os, sys
+sys.argv = ["cnctwin", *sys.argv[1:]]
+from cnctwin.cli import main
+try:
+    main()
+except SystemExit:
+    pass
+print()
+print(*sys.modules, sep="\\n")
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "environment", "expected"),
+    [
+        (["--help"], {}, "Connect controls and recordings"),
+        (["--version"], {}, f"cnctwin {version('cnctwin')}\n"),
+        (["docter"], {}, ""),
+        ([], {"_CNCTWIN_COMPLETE": "complete_bash", "COMP_WORDS": "cnctwin do", "COMP_CWORD": "1"}, "doctor\n"),
+    ],
+)
+def test_help_version_and_completion_load_no_command(words: list[str], environment: dict[str, str], expected: str) -> None:
+    command = [sys.executable, "-c", NO_COMMAND, *words]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=True, timeout=60, env=os.environ | {"COLUMNS": "80"} | environment
+    )
+    text, _, loaded = done.stdout.rpartition("\n\n")
+    assert expected in text + "\n"
+    groups = {group.folder for group in GROUPS}
+    assert {name for name in loaded.split() if name.startswith("cnctwin.commands.")} == {"cnctwin.commands.group", *groups}
+
+
+def test_the_help_lists_each_command_under_its_folder_in_one_line() -> None:
+    command = [Path(sys.executable).with_name("cnctwin"), "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60, env=os.environ | {"COLUMNS": "80"})
+    _, *panels = done.stdout.split("\n╭─ ")
+    shown = {panel.split(" ─")[0]: [line.strip("│ ") for line in panel.split("\n")[1:-1]] for panel in panels}
+    for group in GROUPS:
+        lines = [f"{name:<16}  {summary}" for name, (_, summary) in group.commands.items()]
+        assert [line for line in shown[group.title] if line and not line.startswith("╰")] == lines
+
+
+def test_the_groups_are_the_folders() -> None:
+    folders = {path.parent for path in Path(cnctwin.commands.__file__).parent.glob("*/__init__.py")}
+    assert {group.folder.rpartition(".")[2] for group in GROUPS} == {folder.name for folder in folders}
+    names = [name for group in GROUPS for name in group.commands]
+    assert len(names) == len(set(names))
+
+
+BASH = """
+eval "$(cnctwin --show-completion)"
+COMP_WORDS=({words})
+COMP_CWORD={at}
+_cnctwin_completion cnctwin
+echo "${{COMPREPLY[@]}}"
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "at", "expected"),
+    [
+        ("cnctwin do", 1, "doctor"),
+        ("cnctwin gap ''", 2, "case diagnose score check"),
+        ("cnctwin gap diagnose --o", 3, "--out"),
+    ],
+)
+def test_bash_completes_commands_subcommands_and_options(words: str, at: int, expected: str) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    script = BASH.format(words=words, at=at)
+    environment = os.environ | {"PATH": path}
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, timeout=60, env=environment)
+    assert done.stdout.split() == expected.split(), done.stderr
+
+
+def test_a_mistyped_command_finds_its_neighbour() -> None:
+    done = subprocess.run(
+        [Path(sys.executable).with_name("cnctwin"), "docter"], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (2, "cnctwin: No such command 'docter'. Did you mean 'doctor'? See cnctwin --help\n")
 
 
 def test_the_commands_load_no_library_that_only_some_of_them_need() -> None:
     loaded = _modules_after(ALL_COMMANDS)
-    assert {"cnctwin.commands.gap", "cnctwin.commands.process", "typer"} <= loaded
+    assert {"cnctwin.commands.twin.gap", "cnctwin.commands.run.process", "typer"} <= loaded
     assert loaded & set(HEAVY) == set()
     services = {
         "cnctwin.api.server",

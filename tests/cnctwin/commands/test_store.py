@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.commands.store import import_command, moment_ms, store_app
+from cnctwin.commands.keep.store import import_command, store_app
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.embedded import EmbeddedStore
 from cnctwin.memory.store.opening import open_store
 from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.terminal.moment import moment_ms
 from tests.cnctwin.memory.store.told import HOUR_MS, T0_MS, reading, told
 from twin.runlog import read_run
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.commands.alerts import alerts_app
-from cnctwin.commands.jobs import jobs_app
+from cnctwin.commands.run.jobs import jobs_app
+from cnctwin.commands.see.alerts import alerts_app
 from cnctwin.errors import ApplicationError
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication

@@ -289,7 +289,7 @@ def test_a_trace_that_is_cut_keeps_what_came(tmp_path: Path) -> None:
         ('[time]\ncolumn = "u"\n[columns.x_pos_mm]\nfrom = "p"', "there is no column u for the times; there are t, p"),
         ('[columns.x_pos_mm]\nfrom = "p"', "which column is the time, or period_s"),
         ("[time]\nperiod_s = 1.0\nrate_hz = 1.0", "has period_s and rate_hz"),
-        ('[columns.x_pos_mm]\nfrom = "p"\nfactor = 2', "Extra inputs are not permitted"),
+        ('[columns.x_pos_mm]\nfrom = "p"\nfactor = 2', "columns.x_pos_mm.factor is not known"),
         ("[columns", "is no TOML"),
         (
             '[time]\ncolumn = "t"\n[columns.axis_x_pos_mm]\nfrom = "p"\n[columns.x_pos_mm]\nfrom = "p"',

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.commands.jobs import jobs_app
+from cnctwin.commands.run.jobs import jobs_app
 from cnctwin.errors import UsageError
 from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.consumer import Setting

@@ -120,7 +120,10 @@ def test_a_refusal_goes_where_the_request_says_as_far_as_it_can_be_read() -> Non
         ({}, "machine_toml: no [limits]; write feed_mm_min and spindle_rpm"),
         ({"machine_toml": LIMITED, "objective": "cost"}, "machine_toml: no [cost], which objective = 'cost' needs"),
         ({"machine_toml": "[machine"}, "machine_toml: is not TOML"),
-        ({"machine_toml": LIMITED + "\n[tool]\nteeth = 2"}, "machine_toml: tool.diameter_mm: Field required"),
+        (
+            {"machine_toml": LIMITED + "\n[tool]\nteeth = 2"},
+            "machine_toml: 3 faults; see docs/machine.md\n  tool.diameter_mm is missing",
+        ),
     ],
 )
 def test_a_machine_that_nothing_can_be_chosen_on_is_refused_before_it_waits_in_the_queue(

@@ -133,7 +133,7 @@ def test_what_fails_says_why_in_one_line_and_whether_to_try_again(tmp_path: Path
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"job": "diagnose", "case": "broken"}, "broken/case.toml: runs: Field required"),
+        ({"job": "diagnose", "case": "broken"}, "broken/case.toml: runs is missing"),
         ({"job": "diagnose", "case": "gone"}, "case = 'gone': is no folder with a case.toml below the consumer's files folder"),
         ({"job": "nothing"}, "request: job = 'nothing': is none of optimise, identify, diagnose"),
     ],

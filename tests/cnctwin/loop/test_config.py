@@ -31,7 +31,7 @@ def test_a_machine_has_values_of_its_own() -> None:
     ("table", "says"),
     [
         ({"promote": "by_magic"}, "[loop] promote = 'by_magic'"),
-        ({"shadow": 1}, "[loop] shadow = 1"),
+        ({"shadow": 1}, "[loop] shadow is not known"),
         ({"machines": {"vmc": {"back_floors": -1}}}, "[loop.machines.vmc] back_floors = -1"),
         ({"machines": 3}, "one table for each machine"),
     ],

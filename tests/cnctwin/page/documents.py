@@ -296,7 +296,7 @@ def tell_all(shop: Shop) -> None:
 
 
 CHANGED = "description 9b1c77aa2e01 live: promoted by anna: coolant cools"
-FAULTY = "machines/vmc.toml: thermal.resistance_k_per_w: should be greater than 0"
+FAULTY = "machines/vmc.toml: thermal.resistance_k_per_w: must be above 0"
 
 
 def _tell_machine(shop: Shop, machine: str, is_first: bool, started: float) -> None:

@@ -15,6 +15,7 @@ from cnctwin.validation.model import Twin
 from cnctwin.validation.night import worst
 from cnctwin.validation.temperature import judged_temperature
 from cnctwin.validation.track import Track
+from cnctwin.validation.validate import still_missing
 from cnctwin.validation.vibration import judged_vibration
 from tests.cnctwin.validation.made_night import START_S, changed_twin, told_twin, warm_night, working_spindle
 from twin.machine import SpindleDrive
@@ -75,6 +76,15 @@ def test_less_than_an_hour_is_not_judged(night: RunLog) -> None:
     found = judged_temperature(told_twin(), of_run(short, "vmc"), BUDGETS)
     assert {one.verdict for one in found} == {Verdict.TOO_LITTLE}
     assert all(one.value is None and "1 h are needed" in (one.reason or "") for one in found)
+    (plan,) = still_missing(found, 0.0, 1800.0)
+    keys = "temperature_mae, temperature_mae_worst_hour, temperature_rmse, temperature_rmse_worst_hour"
+    assert plan == f"{keys}: 29.8 min of 1 h seen in 30 min; 30.2 min more, at the present rate in 30.3 min"
+
+
+def test_what_was_not_recorded_is_in_the_plan_with_its_reason(night: RunLog) -> None:
+    blind = run_log({"t_s": night.t_s, **{n: v for n, v in night.columns.items() if n != "spindle_temp_c"}}, "blind")
+    (plan,) = still_missing(judged_temperature(told_twin(), of_run(blind, "vmc"), BUDGETS), 0.0, 1800.0)
+    assert plan.endswith(": spindle_temp_c was not measured")
 
 
 @pytest.mark.parametrize(

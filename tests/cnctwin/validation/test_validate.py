@@ -10,7 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cnctwin.commands.validate import validate
+from cnctwin.commands.twin.validate import validate
 from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.standins.simulated_machine.description import PROCESSORS, TOLD
@@ -204,7 +204,7 @@ def test_the_sample_configuration_holds_the_defaults() -> None:
         (["--store", "nowhere/at/all", *DAY], "nowhere/at/all"),
         (["--runs", "none.parquet"], "none.parquet"),
         (["--from", "yesterday"], "--from 'yesterday' is no moment"),
-        (["--from", "2026-11-22", "--to", "2026-11-21"], "is not before"),
+        (["--from", "2026-11-22", "--to", "2026-11-21"], "is not after"),
         (["--runs", "a.parquet", "--store", "b"], "give one of them"),
         (["--runs", "a.parquet", "--truth", "b.parquet", "--truth", "c.parquet"], "2 truth files for 1 runs"),
     ],
@@ -221,7 +221,7 @@ def test_wrong_input_is_one_line(arguments: list[str], said: str, tmp_path: Path
 def test_a_budget_that_is_none_is_refused_with_what_there_is(tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text("[validation]\ntemperature_k = 2.0\n")
     write_run(warm_night(0.1), tmp_path / "r.parquet")
-    with pytest.raises(ApplicationError, match=r"\[validation\] temperature_k = 2\.0.*known: temperature_mae_k"):
+    with pytest.raises(ApplicationError, match=r"\[validation\] temperature_k is not known; did you mean temperature_mae_k"):
         run("--runs", str(tmp_path / "r.parquet"), "--config", str(tmp_path / "p.toml"))
 
 

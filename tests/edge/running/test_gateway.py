@@ -158,7 +158,7 @@ def test_a_file_with_a_mistake_changes_nothing_and_is_told_once(works: Works, ca
         for _ in range(3):
             works.look()
     assert works.running == ["a"]
-    assert caplog.text.count("machine.lost_after: no such key") == 1
+    assert caplog.text.count("machine.lost_after is not known") == 1
     assert "the edge goes on as it was" in caplog.text
 
 
@@ -193,7 +193,7 @@ def test_one_that_does_not_end_is_left_behind_and_holds_nobody_up(works: Works, 
 
 def test_a_single_file_that_cannot_be_used_ends_with_its_error(works: Works) -> None:
     file = works.write("a", "lost_after = 5\n")
-    with pytest.raises(ConfigError, match=r"machine\.lost_after: no such key"):
+    with pytest.raises(ConfigError, match=r"machine\.lost_after is not known"):
         works.over(file).run(threading.Event())
     with pytest.raises(ConfigError, match="cannot be read: No such file"):
         works.over(works.folder / "none.toml").run(threading.Event())

@@ -38,7 +38,7 @@ def test_a_wrong_configuration_says_what_is_wrong(table: dict[str, Any], said: s
     ("receiver", "said"),
     [
         ({"type": "pushover", "token": "hunter2", "user": "$U"}, "a secret does not stand in the configuration"),
-        ({"type": "pushover", "token": "$T", "user": "$U", "password": "hunter2"}, "Extra inputs are not permitted"),
+        ({"type": "pushover", "token": "$T", "user": "$U", "password": "hunter2"}, "receivers.x.pushover.password is not known"),
         ({"type": "webhook", "url": "https://ada:hunter2@plant.example/x"}, "holds a user name or a password"),
         ({"type": "webhook", "url": "https://plant.example/x?key=hunter2"}, "has a query"),
         ({"type": "webhook", "url": "http://plant.example/hunter2"}, "is not encrypted: use https://"),

@@ -101,7 +101,10 @@ def test_holidays_exceptions_and_machines_have_their_own_shifts() -> None:
         ({"shifts": {"a": {"start": "06:00", "end": "14:00"}, "b": {"start": "13:00", "end": "22:00"}}}, "'a' and 'b' overlap"),
         ({"shifts": {"a": {"start": "22:00", "end": "07:00"}, "b": {"start": "06:00", "end": "14:00"}}}, "'a' and 'b' overlap"),
         ({"exceptions": [{"date": "2026-12-19", "shifts": ["erly"]}]}, "there is no shift 'erly'"),
-        ({"exceptions": [{"date": "2026-12-19", "shifts": ["early"], "machine": "x"}]}, "Extra inputs are not permitted"),
+        (
+            {"exceptions": [{"date": "2026-12-19", "shifts": ["early"], "machine": "x"}]},
+            "exceptions.0.machine is not known; did you mean machines?",
+        ),
         ({"machines": {"old": {"shifts": ["noon"]}}}, "machines.old: there is no shift 'noon'"),
         ({"holidays": ["Christmas"]}, "holidays.0 = 'Christmas'"),
     ],

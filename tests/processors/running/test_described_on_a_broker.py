@@ -110,9 +110,7 @@ def test_a_wrong_file_leaves_the_one_before_live_and_is_told(
     until(lambda: (go_on(), version(reader) == description(2.0).version)[1], "the file")
     write(tmp_path, toml(-3.0))
     until(lambda: reader.plain.get(FAULT), "the fault")
-    assert (
-        "okuma.toml: spindle.rated_power_kw: Input should be greater than 0, not -3.0" in json.loads(reader.plain[FAULT])["text"]
-    )
+    assert "okuma.toml: spindle.rated_power_kw = -3.0: must be above 0" in json.loads(reader.plain[FAULT])["text"]
     go_on()
     assert version(reader) == description(2.0).version
     assert json.loads(reader.plain[LIVE])["version"] == description(2.0).version

@@ -27,7 +27,7 @@ def test_a_file_sets_the_limits_it_names_and_leaves_the_others(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "told"),
     [
-        ("metrics_max = 1", r"\[limits\] metrics_max: there is no such limit; the limits are id_bytes_max, "),
+        ("metrics_max = 1", r"\[limits\] metrics_max is not known; "),
         ("text_bytes_max = 0", r"\[limits\] text_bytes_max = 0 is no whole number from 1"),
         ("text_bytes_max = true", "text_bytes_max = True is no whole number"),
         ('text_bytes_max = "much"', "text_bytes_max = 'much' is no whole number"),

@@ -317,12 +317,22 @@ def test_everything_is_checked_before_anything_connects(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"\[thermal\] resistance_k_per_w = -1.0"):
         configured(["thermal"], config)
     config.write_text("[termal]\n")
-    with pytest.raises(ConfigurationError, match=r"\[termal\].*there are"):
+    with pytest.raises(ConfigurationError, match=r"\[termal\] is not known; did you mean thermal\?"):
         configured(["thermal"], config)
     config.write_text("tick_s = 1\n")
-    with pytest.raises(ConfigurationError, match="outside a table"):
+    with pytest.raises(ConfigurationError, match="tick_s is in no table; put it below its processor"):
         configured(["thermal"], config)
     with pytest.raises(ConfigurationError, match="No such file"):
         configured(["thermal"], tmp_path / "missing.toml")
+    config.write_text("[gapp]\n[thermal]\ntick = 2\n[thermal.machines.vmc]\ngap_s_max = 0\n[cutting_force]\nefficency = 1\n")
+    with pytest.raises(ConfigurationError) as wrong:
+        configured(["thermal", "cutting_force"], config)
+    assert str(wrong.value).split("\n  ") == [
+        f"{config}: 4 faults; see docs/processors.md",
+        "[gapp] is not known; did you mean gap?",
+        "[thermal] tick is not known; did you mean tick_s?",
+        "[thermal.machines.vmc] gap_s_max = 0: must be above 0",
+        "[cutting_force] efficency is not known; did you mean efficiency?",
+    ]
     config.write_text("[cutting_force]\nefficiency = 0.7\n")
     assert [processor.name for processor, _ in configured(["thermal", "thermal"], config)] == ["thermal"]

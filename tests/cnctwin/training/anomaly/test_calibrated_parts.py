@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.commands.train.app import train_app
+from cnctwin.commands.learn.train.app import train_app
 from cnctwin.errors import UsageError
 from cnctwin.training.anomaly.parts_cell import PartTicks, cell_of_parts
 from processors.joint_anomaly.processor import PROCESSOR

@@ -1,6 +1,7 @@
 """`cnctwin train residual`: from run logs and from a store to a model that the processor takes, or to why there is none."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cnctwin.commands.train.residual import train_residual
+from cnctwin.commands.learn.train.residual import train_residual
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store
@@ -81,7 +82,12 @@ def test_a_worthless_model_is_not_kept(folder: Path, tmp_path: Path) -> None:
 def test_too_few_hours_are_refused_unless_they_are_allowed(folder: Path, tmp_path: Path) -> None:
     done = _ran(folder, str(folder / "good.parquet"), "--out", str(tmp_path), "--hours-min", "400")
     assert isinstance(done.exception, UsageError)
-    assert "h of cutting in 60.0 h; 400 h are asked for: record more, or allow fewer with --hours-min" in str(done.exception)
+    first, plan, way_out = str(done.exception).split("\n")
+    assert first == "okuma: not enough to train on yet"
+    assert re.fullmatch(
+        r"  cutting \(.*\): [\d.]+ h of 16.7 days seen in 60 h; .* days more, at the present rate in .* days", plan
+    )
+    assert way_out.startswith("  record on, or allow fewer with --hours-min ")
 
 
 WRONG = {

@@ -20,7 +20,7 @@ from edge.errors import ConfigError
         ('host = "http://x"', "focas.host = 'http://x'"),
         ("interval_ms = 5", "focas.interval_ms = 5"),
         ('groups = ["blocks"]', "focas.groups"),
-        ("speed = 1", "focas.speed: no such key"),
+        ("speed = 1", "focas.speed is not known"),
     ],
 )
 def test_a_mistake_is_one_line_that_names_key_and_value(line: str, complaint: str) -> None:

@@ -31,7 +31,7 @@ from edge.signals import signal
         ('username = "edge"', "username needs password_env"),
         ('user_certificate = "a.der"', "user_certificate and user_key belong together"),
         ("queue_size = 0", "must be 1 or more"),
-        ("trust_all = true", "no such key"),
+        ("trust_all = true", "is not known"),
     ],
 )
 def test_what_cannot_be_used_is_refused_before_any_connection(line: str, complaint: str) -> None:

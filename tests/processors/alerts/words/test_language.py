@@ -31,7 +31,7 @@ def test_a_file_changes_what_it_names_and_leaves_the_rest_in_english(tmp_path: P
     [
         ('title = "{{ machine"', "title: "),
         ('[alerts.rule_vibration]\nname = "x"\nwhat = "{% if %}"', "alerts.rule_vibration.what: "),
-        ('titel = "x"', "titel: Extra inputs are not permitted"),
+        ('titel = "x"', "titel is not known; did you mean title?"),
         ("[form]\ndecimal = 7", "form.decimal: "),
         ("title = ", "Invalid value"),
         ('title = "{{ x|nofilter }}"', "No filter named 'nofilter'"),
