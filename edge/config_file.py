@@ -64,7 +64,13 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
             faults.append(unknown(f"machine.adapter = {machine.adapter!r}", machine.adapter, modules()))
     own = () if adapter is None else (adapter.name,)
     others = tables if adapter is not None else {name: table for name, table in tables.items() if name not in modules()}
-    faults += [unknown(f"[{name}]", name, (*_SECTIONS, *own)) for name in others]
+    for name in others:
+        is_other_control = adapter is not None and name in modules()
+        faults.append(
+            f'[{name}]: is the table of another control; remove it, or write adapter = "{name}" below [machine]'
+            if is_other_control
+            else unknown(f"[{name}]", name, (*_SECTIONS, *own))
+        )
     if adapter is None or faults:
         raise ConfigError(report(path, faults, "docs/edges.md"))
     config = EdgeConfig(source=source, path=path, **sections)

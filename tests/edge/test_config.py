@@ -60,8 +60,8 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
             'vmc.toml: machine.adapter is missing; [focas] needs adapter = "focas" below [machine]',
         ),
         ("[opcua]", 'vmc.toml: machine.adapter is missing; [opcua] needs adapter = "opcua" below [machine]'),
-        ("[machine]\nadapter = 'focas'\n[opcua]", "vmc.toml: [opcua] is not known; known are machine, broker, signals, "),
-        ("[mtconnect]\n[opcua]", "vmc.toml: [opcua] is not known; known are machine, broker, signals, "),
+        ("[machine]\nadapter = 'focas'\n[opcua]", "vmc.toml: [opcua]: is the table of another control; "),
+        ("[mtconnect]\n[opcua]", "vmc.toml: [opcua]: is the table of another control; "),
         (
             "[broker]\nurl = 'mqtt://a'\nurls = ['mqtt://b']",
             "vmc.toml: broker: has url and urls; put all brokers into urls",

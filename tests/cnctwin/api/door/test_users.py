@@ -31,7 +31,7 @@ def test_users_have_roles_and_tokens(tmp_path: Path) -> None:
     [
         (f'[ada]\nrole = "king"\ntoken = "{SECRET}"', "ada.role"),
         (f'[ada]\ntoken = "{SECRET}"', "ada.role is missing"),
-        ('[ada]\nrole = "reader"\ntoken = "short-secret"', "ada.token: String should have at least 16 characters"),
+        ('[ada]\nrole = "reader"\ntoken = "short-secret"', "ada.token: needs 16 characters or more"),
         (f'[ada]\nrole = "reader"\ntoken = "{SECRET}"\n[bob]\nrole = "reader"\ntoken = "{SECRET}"', "the token of another"),
         (f'["a b"]\nrole = "reader"\ntoken = "{SECRET}"', "'a b' is no name"),
         (f'[ada]\nrole = "reader"\ntoken = "{SECRET}', "line 3 is no TOML|the end is no TOML"),
