@@ -10,8 +10,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from twin.assumption import Assumption, checked, with_assumptions
 from twin.errors import MachineError
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
@@ -35,7 +36,8 @@ class Section(BaseModel):
 class Machine(Section):
     """[machine]: its name, the period at which position and velocity loop tick, and what of the file is only assumed.
 
-    assumed: sections and constants that nobody has stated or fitted, by path: `thermal`, `spindle.efficiency`
+    assumed: sections and constants that nobody has stated or fitted, by path: `thermal`, `spindle.efficiency`; those of
+    [assumed] too
     """
 
     name: str = Field(min_length=1)
@@ -262,6 +264,18 @@ class MachineFile(Section):
     noise: dict[str, NotNegative] = Field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
     learned: tuple[LearnedSection, ...] = ()
+    assumed: dict[str, Assumption] = Field(default_factory=dict)
+
+    @field_validator("assumed")
+    @classmethod
+    def _assumptions_are_of_what_is_stated(cls, given: dict[str, Assumption], info: ValidationInfo) -> dict[str, Assumption]:
+        checked(given, info.data)
+        return given
+
+    @model_validator(mode="before")
+    @classmethod
+    def _assumptions_count_everywhere(cls, given: Any) -> Any:
+        return with_assumptions(given) if isinstance(given, dict) else given
 
     @model_validator(mode="before")
     @classmethod

@@ -16,7 +16,7 @@ from processors.production.calendar_file import read_calendar_file
 from processors.production.config import Config
 from twin.expected.expectation import Expectation
 from twin.expected.files import load_expectations
-from twin.live.assumed import is_assumed
+from twin.assumed import is_assumed
 from twin.vocabulary.program_names import program_key
 
 CALENDAR, EXPECTATIONS = "calendar", "expectations"
