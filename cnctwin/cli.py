@@ -23,6 +23,8 @@ from twin.errors import TwinError
 
 COMMANDS = {
     "demo": "cnctwin.commands.demo:demo",
+    "init": "cnctwin.commands.starting.init:init",
+    "up": "cnctwin.commands.starting.up:up",
     "watch": "cnctwin.commands.watch:watch",
     "doctor": "cnctwin.commands.doctor:doctor",
     "process": "cnctwin.commands.process:process",

@@ -22,9 +22,9 @@ class Assumption(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    range: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], Annotated[float, Field(gt=0, allow_inf_nan=False)]] | None = (
-        None
-    )
+    range: (
+        tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], Annotated[float, Field(gt=0, allow_inf_nan=False)]] | None
+    ) = None
     source: str = Field(min_length=1)
 
     @model_validator(mode="after")

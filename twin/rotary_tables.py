@@ -126,7 +126,10 @@ def _range_times(entry: Any, factor: float) -> Any:
     """An entry of [assumed] with its range in other units; it may have anything in it."""
     if factor == 1.0 or not isinstance(entry, Mapping) or not isinstance(entry.get("range"), list | tuple):
         return entry
-    return {**entry, "range": [float(f"{one * factor:.{DIGITS}g}") if isinstance(one, float | int) else one for one in entry["range"]]}
+    return {
+        **entry,
+        "range": [float(f"{one * factor:.{DIGITS}g}") if isinstance(one, float | int) else one for one in entry["range"]],
+    }
 
 
 def _scale(axis: Mapping[str, Any]) -> float:

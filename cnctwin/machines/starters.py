@@ -1,4 +1,4 @@
-"""Starter machines: a complete machine.toml for each class of machine, every figure of which is assumed, with its range and source.
+"""Starter machines: a complete machine.toml for each class of machine, every figure of it assumed, with its range and source.
 
 A class is a file `classes/<class>.toml` beside this one, and is found by it.
 """

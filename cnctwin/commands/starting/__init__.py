@@ -1,0 +1,1 @@
+"""The commands by which a plant begins: `init` sets its folder up, `up` runs it."""
