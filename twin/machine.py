@@ -17,7 +17,7 @@ from twin.errors import MachineError
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
 from twin.programs import Settings
-from twin.rotary import outside_name, outside_text
+from twin.rotary import outside_name, outside_path, outside_text
 from twin.rotary_tables import tables_inside
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -354,8 +354,12 @@ def _as_written(tables: dict[str, Any], error: ValidationError) -> list[dict[str
     except ValidationError as unscaled:
         error = unscaled
     faults: list[dict[str, Any]] = [dict(fault) for fault in error.errors(include_url=False)]
+    rotary = {letter: 1.0 for letter, axis in written.get("axes", {}).items() if isinstance(axis, dict) and "scale" in axis}
     for fault in faults:
         place = fault["loc"]
+        if place[:1] == ("assumed",):
+            fault["loc"] = tuple(outside_path(str(part), rotary) for part in place)
+            fault["msg"] = outside_text(fault["msg"], rotary, ())
         if len(place) > 1 and place[0] == "axes" and "scale" in written["axes"].get(place[1], ()):
             fault["loc"] = (*place[:-1], outside_name(str(place[-1]))[0])
             fault["msg"] = outside_text(fault["msg"], {str(place[1]): 1.0}, ())

@@ -36,6 +36,7 @@ class Plant:
     port: int
     children: list[Child] = field(default_factory=list)
     broker: PrivateBroker | None = None
+    _edge_command: list[str] = field(default_factory=list)
     _not_before_s: dict[str, float] = field(default_factory=dict)
 
     def start(self) -> str:
@@ -57,13 +58,14 @@ class Plant:
         files.mkdir(exist_ok=True)
         self._begin("jobs", ["jobs", "run", "--dir", str(jobs), "--files", str(files), *broker])
         self._begin("loop", ["twin", "run", *config, *machines, "--jobs", str(jobs), "--jobs-files", str(files), *broker])
-        if any(folder.edges.glob("*.toml")):  # last: from its first word on somebody is there to listen
-            self._begin("edge", ["edge", "run", str(folder.edges), *broker])
+        self._edge_command = ["edge", "run", str(folder.edges), *broker]
+        self._begin_edges()  # last: from their first word on somebody is there to listen
         return page
 
     def watch(self) -> list[str]:
         """Start again what has died, after a pause that grows; return what is to be said of it."""
         said = ["the private broker ended and was started again"] if self.broker is not None and self.broker.watch() else []
+        self._begin_edges()
         now_s = time.monotonic()
         for child in self.children:
             if now_s >= self._not_before_s.get(child.name, 0.0) and not child.running:
@@ -104,6 +106,12 @@ class Plant:
         if url:  # started again, it has to be where the browser looks for it
             page.command = [*page.command[:-1], str(urlsplit(url).port)]
         return url or f"does not start: {page.last_words()}"
+
+    def _begin_edges(self) -> None:
+        """Start the edges as soon as there is a machine; one process takes up all that come later."""
+        if self._edge_command and any(self.folder.edges.glob("*.toml")):
+            self._begin("edge", self._edge_command)
+            self._edge_command = []
 
     def _begin(self, name: str, arguments: list[str]) -> None:
         logs = self.folder.state / "logs"

@@ -102,7 +102,7 @@ class SetUp:
         """The control, its edge's file, and the name of the machine."""
         there = sorted(self.folder.edges.glob("*.toml"))
         known = there[0].stem if len(there) == 1 else None
-        machine = self.answers.machine or known
+        machine = known if self.answers.machine is None else _checked_name(self.answers.machine)
         file = None if machine is None else self.folder.edges / f"{machine}.toml"
         before = None if file is None else text_of(file)
         now = NONE if before is None or file is None else address_of(before, file)
@@ -137,15 +137,7 @@ class SetUp:
         return draft
 
     def _named(self, default: str) -> str:
-        def checked(name: str) -> str:
-            try:
-                return check_id(name, "machine name")
-            except TopicError as error:
-                raise UsageError(str(error)) from None
-
-        if self.answers.machine is not None:
-            return checked(self.answers.machine)
-        return self._answered("Name of the machine", default, "--machine", None, checked)
+        return self._answered("Name of the machine", default, "--machine", None, _checked_name)
 
     def _broker(self, machine: str) -> None:
         """The broker, which is tried, and its password."""
@@ -243,6 +235,14 @@ class SetUp:
                 if given is not None or not self.dialog.is_patient:
                     raise
                 self.dialog.tell(f"  {error}")
+
+
+def _checked_name(name: str) -> str:
+    """Return the name of a machine, which can be one of a Sparkplug device and of a file. Raises UsageError."""
+    try:
+        return check_id(name, "machine name")
+    except TopicError as error:
+        raise UsageError(f"{error}; give another one with --machine") from None
 
 
 def _name_in(draft: str) -> str:
