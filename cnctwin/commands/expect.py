@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, file_or_class
 from cnctwin.errors import UsageError
 from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.program_text import read_text
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def expect(
     programs: Annotated[list[Path], typer.Argument(help="Part programs; the name of a file is that of its program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine")],
+    machine: Annotated[Path, typer.Option(callback=file_or_class, help="machine.toml of the machine, or a class, as vmc-40")],
     out: Annotated[Path, typer.Option(help="Folder of expectations, which the processors read")] = Path("expectations"),
     tools: Annotated[Path | None, typer.Option(help="TOML with \\[tools.N], in place of those of the machine")] = None,
     lines: Annotated[

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, file_or_class
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded
 from cnctwin.processes.extras import needed_by
@@ -33,7 +33,9 @@ BINDS_SHOWN, FRONT_SHOWN = 6, 20
 
 def optimise(
     program: Annotated[Path, typer.Argument(help="The part program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine, or the twin.toml of a diagnosis")],
+    machine: Annotated[
+        Path, typer.Option(callback=file_or_class, help="machine.toml of the machine, the twin.toml of a diagnosis, or a class")
+    ],
     out: Annotated[Path, typer.Option(help="Write the program there; its report beside it as .html, everything as .json")],
     objective: Annotated[str, typer.Option(help="time, cost or pareto")] = "time",
     force_limit_n: Annotated[float | None, typer.Option(help="Greatest cutting force, N; else that of \\[limits]")] = None,

@@ -25,3 +25,10 @@ Machines = Annotated[
 ]
 StorePlace = Annotated[str | None, typer.Option("--store", help="Folder or address; else $CNCTWIN_STORE", show_default=False)]
 Wait = Annotated[float, typer.Option("--wait", help="Seconds to wait for an answer", min=0.5, max=600.0)]
+
+
+def file_or_class(given: Path) -> Path:
+    """Return the machine.toml that was given, or that of the class of machine that was named in its place."""
+    from cnctwin.machines.starters import CLASSES, machine_classes
+
+    return CLASSES / f"{given}.toml" if not given.exists() and str(given) in machine_classes() else given

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson
+from cnctwin.commands.options import AsJson, file_or_class
 from cnctwin.errors import UsageError
 from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.output import check_suffix, write
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 def simulate(
     program: Annotated[Path, typer.Argument(help="The part program")],
-    machine: Annotated[Path, typer.Option(help="machine.toml of the machine to run it on")],
+    machine: Annotated[
+        Path, typer.Option(callback=file_or_class, help="machine.toml of the machine to run it on, or a class, as vmc-40")
+    ],
     out: Annotated[Path | None, typer.Option(help="Write the run log there, .parquet or .csv")] = None,
     seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course", min=0)] = None,
     as_json: AsJson = False,
