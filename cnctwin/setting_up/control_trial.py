@@ -23,7 +23,8 @@ def drafted(url: str, device: str) -> str:
     try:
         return discover(url, device=device)
     except EdgeError as error:
-        raise UsageError(f"no control answers at {shown_address(url)}: {error}") from None
+        shown = shown_address(url)
+        raise UsageError(f"no control answers at {shown}: {str(error).removeprefix(f'{shown}: ')}") from None
 
 
 def address_of(text: str, path: Path) -> str:

@@ -22,6 +22,7 @@ from cnctwin.setting_up.control_trial import address_of, at_another_address, dra
 from cnctwin.setting_up.dialog import Dialog
 from cnctwin.setting_up.planned_files import PlannedFile, text_of
 from cnctwin.setting_up.toml_text import with_key
+from edge.state_dir import VARIABLE as STATE_VARIABLE
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError, TopicError
 from sparkplug.topics import check_id
@@ -89,7 +90,7 @@ class SetUp:
     def files(self) -> list[PlannedFile]:
         """Ask, try, and return the files that come of it. Raises UsageError; nothing is written."""
         machine = self._control()
-        self._broker(machine)
+        self._broker()
         self._alerts()
         self._class(machine)
         if self.answers.service and text_of(self.folder.unit) is None:
@@ -123,6 +124,8 @@ class SetUp:
         """The draft for a control, its first values shown; None where there is none."""
         if url == NONE:
             return None
+        if url.startswith("opc.tcp://"):  # the certificates that are exchanged are kept where `cnctwin up` looks for them
+            os.environ[STATE_VARIABLE] = str(self.folder.state)
         kept = before if url == now else None
         draft = kept or drafted(url, self.answers.device)
         try:
@@ -139,7 +142,7 @@ class SetUp:
     def _named(self, default: str) -> str:
         return self._answered("Name of the machine", default, "--machine", None, _checked_name)
 
-    def _broker(self, machine: str) -> None:
+    def _broker(self) -> None:
         """The broker, which is tried, and its password."""
         file = self.folder.addresses
         before = text_of(file)
@@ -155,14 +158,17 @@ class SetUp:
         self.texts[file] = with_variables(before or ADDRESSES, {BROKER_VARIABLE: given})
         if password is not None:
             self._keep({PASSWORD_VARIABLE: password})
-        edge = self.folder.edges / f"{machine}.toml"
-        if given and edge in self.texts:
-            named = with_key(self.texts[edge], "broker", "url", given, edge)
-            self.texts[edge] = named if password is None else with_key(named, "broker", "password_env", PASSWORD_VARIABLE, edge)
+        edges = self.folder.edges
+        named = {path for path in self.texts if path.parent == edges} | (set() if url == now else set(edges.glob("*.toml")))
+        for edge in sorted(named) if given else ():
+            text = with_key(self.texts.get(edge) or text_of(edge) or "", "broker", "url", given, edge)
+            has_user = BrokerAddress.from_url(given).username is not None
+            self.texts[edge] = with_key(text, "broker", "password_env", PASSWORD_VARIABLE, edge) if has_user else text
 
     def _tried(self, url: str) -> tuple[str, str | None]:
         """An address that was tried, with the password of its user."""
-        if url == PRIVATE or url == variables(self.folder.addresses).get(BROKER_VARIABLE):
+        is_kept = self.answers.broker is None and url == variables(self.folder.addresses).get(BROKER_VARIABLE)
+        if url == PRIVATE or is_kept:
             return url, None
         try:
             broker = BrokerAddress.from_url(url)
@@ -175,7 +181,7 @@ class SetUp:
             password = there or self.dialog.secret(f"Password of {broker.username} on the broker", PASSWORD_VARIABLE)
         try_broker(broker.with_password(password))
         self.dialog.tell(f"{broker.url}: connected")
-        return broker.url if "?" not in url else url, password
+        return url, password
 
     def _alerts(self) -> None:
         """The receiver of alerts, to which a test is sent."""

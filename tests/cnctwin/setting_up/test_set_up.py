@@ -2,6 +2,7 @@
 
 import json
 import stat
+import subprocess
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -80,6 +81,40 @@ def test_answers_by_options_make_files_that_every_program_takes(
     ]
     assert [one["receiver"] for one in webhook[1]] == ["operators"]
     assert f"CNCTWIN_BROKER={broker}\n" in (tmp_path / "plant.env").read_text()
+
+
+@pytest.fixture
+def guarded(tmp_path_factory: pytest.TempPathFactory, mosquitto_program: str) -> Iterator[str]:
+    """A broker that asks for a password."""
+    users = tmp_path_factory.mktemp("broker") / "users"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(users), "ada", "s3cret word"], check=True, capture_output=True)
+    with Mosquitto(extra=(f"password_file {users}", "allow_anonymous false")) as running:
+        yield f"mqtt://ada@127.0.0.1:{running.port}"
+
+
+def test_the_password_of_a_broker_is_asked_for_tried_and_kept_apart(tmp_path: Path, agent: str, guarded: str) -> None:
+    code, said = init(tmp_path, "--control", agent, "--machine", "vmc", answers=f"{guarded}\ns3cret word\nnone\nvmc-40\ny\n")
+    assert code == 0, said
+    assert "CNCTWIN_PASSWORD=s3cret word\n" in (tmp_path / "secrets" / "plant.env").read_text()
+    edge = load(tmp_path / "edges" / "vmc.toml")
+    assert (edge.broker.url, edge.broker.password_env) == (guarded, "CNCTWIN_PASSWORD")
+    assert [name for name, text in contents(tmp_path).items() if "s3cret" in text] == ["secrets/plant.env"]
+
+
+def test_a_wrong_password_is_not_written(tmp_path: Path, guarded: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CNCTWIN_PASSWORD", "guessed")
+    code, said = init(tmp_path, "--broker", guarded)
+    assert code != 0
+    assert "guessed" not in said
+    assert contents(tmp_path) == {}
+
+
+def test_another_broker_becomes_that_of_every_edge(tmp_path: Path, agent: str, mosquitto: Mosquitto) -> None:
+    for name in ("one", "two"):
+        init(tmp_path, "--control", agent, "--machine", name)
+    broker = f"mqtt://127.0.0.1:{mosquitto.port}"
+    init(tmp_path, "--machine", "two", "--broker", broker)
+    assert [load(tmp_path / "edges" / f"{name}.toml").broker.url for name in ("one", "two")] == [broker, broker]
 
 
 def test_a_secret_stands_in_its_own_file_alone_and_is_never_shown(
