@@ -72,16 +72,15 @@ def listed(paths: Sequence[str]) -> str:
 
 def narrowed_in_words(before: MachineFile, after: MachineFile) -> tuple[str, ...]:
     """Return what recordings have told of the constants that were assumed, and what they have not; nothing where none was."""
-    was, still = _each(before), assumed_in_words(after)
-    if not was:
+    if not before.machine.assumed:
         return ()
-    told = f"{len(was - _each(after))} of {len(was)} assumed constants are known from these recordings now"
+    left, still = set(after.machine.assumed), assumed_in_words(after)
+    was: list[str] = []
+    for one in before.machine.assumed:  # a section counts as one, unless a part of it is told
+        is_parted = one not in left and any(path.startswith(f"{one}.") for path in left)
+        was += _constants(before, one) if is_parted else (one,)
+    told = f"{len(set(was) - left)} of {len(was)} assumed constants are known from these recordings now"
     return (f"{told}; still assumed: {still}" if still else f"{told}; nothing is assumed any more",)
-
-
-def _each(machine: MachineFile) -> set[str]:
-    """Return the paths of all constants that are assumed, those of sections one by one."""
-    return {path for one in machine.machine.assumed for path in _constants(machine, one) or (one,)}
 
 
 def _constants(machine: MachineFile, path: str) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """`cnctwin up`: all processes of a plant's folder, each started in order, and again when it dies."""
 
+import logging
 import os
 import sys
 import time
@@ -9,6 +10,7 @@ from threading import Event
 from urllib.parse import urlsplit
 
 from cnctwin.errors import UsageError
+from cnctwin.processes import child as child_module
 from cnctwin.processes import state_file
 from cnctwin.processes.child import Child
 from cnctwin.processes.given_broker import BROKER_VARIABLE, address
@@ -102,6 +104,10 @@ class Plant:
         self._begin("page", ["serve", *arguments, "--no-open", "--state-file", str(state), "--port", str(port)])
         page = self.children[-1]
         self._await(lambda: bool(state_file.read(state).get("url")) or not page.running)
+        if not page.running and port:  # somebody else has taken the port meanwhile
+            page.command = [*page.command[:-1], "0"]
+            page.start()
+            self._await(lambda: bool(state_file.read(state).get("url")) or not page.running)
         url = str(state_file.read(state).get("url", ""))
         if url:  # started again, it has to be where the browser looks for it
             page.command = [*page.command[:-1], str(urlsplit(url).port)]
@@ -129,6 +135,7 @@ class Plant:
 
 def run(folder: PlantFolder, port: int, stop: Event, tell: Callable[[str], None]) -> None:
     """Run the plant until `stop` is set."""
+    logging.getLogger(child_module.__name__).setLevel(logging.ERROR)  # what ends is told here
     plant = Plant(folder, port)
     try:
         page = plant.start()

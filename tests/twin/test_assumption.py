@@ -75,9 +75,15 @@ def test_a_constant_that_recordings_tell_leaves_the_table_and_the_list() -> None
     assert list(told.assumed) == ["spindle.idle_power_kw", "axes.b.mass_kg"]
     assert "spindle.efficiency" not in told.machine.assumed
     assert narrowed_in_words(machine(), told) == (
-        "1 of 7 assumed constants are known from these recordings now; still assumed: thermal, spindle.idle_power_kw, "
+        "1 of 4 assumed constants are known from these recordings now; still assumed: thermal, spindle.idle_power_kw, "
         "axes.b.inertia_kg_m2",
     )
+
+
+def test_a_section_of_which_a_part_is_told_is_counted_by_its_constants() -> None:
+    told = with_fitted(machine(), {"thermal.beta_w_per_rpm": 0.02})
+    assert narrowed_in_words(machine(), told)[0].startswith("1 of 7 assumed constants are known from these recordings now; ")
+    assert len(told.machine.assumed) == 6
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,6 +58,21 @@ def test_everything_begins_comes_back_and_ends(tmp_path: Path, plant: Path) -> N
         pids = children(program.process.pid).values()
         assert program.ask_to_end(signal.SIGTERM) == 0
         assert not any(map(is_alive, pids))
+
+
+def test_a_page_whose_port_is_taken_has_another_one(plant: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cnctwin.running.plant.is_free", lambda port: True)  # taken a moment later
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        running = Plant(PlantFolder(plant), taken.getsockname()[1])
+        running.folder.state.mkdir()
+        try:
+            url = running._page(["--config", str(running.folder.processors), "--broker", "mqtt://127.0.0.1:1"])
+            assert url.startswith("http://127.0.0.1:")
+            assert not url.endswith(f":{taken.getsockname()[1]}")
+        finally:
+            running.stop()
 
 
 def test_a_folder_that_is_no_plant_is_refused(tmp_path: Path) -> None:
