@@ -17,7 +17,8 @@ from processors.contract import Output, OutputSpec, Processor, Provenance, Sampl
 from processors.description import Description
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
-from twin.live.assumed import SPINDLE, TOOL_DIAMETER_MM, assumed_of, completed, is_assumed
+from twin.assumed import is_assumed
+from twin.live.assumed import SPINDLE, TOOL_DIAMETER_MM, assumed_of, completed
 from twin.live.force import SPINDLE_RPM_MIN, LiveForce, ToolUsed
 from twin.live.speed import SpindleSpeed
 from twin.live.spindle import LiveSpindle

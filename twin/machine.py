@@ -10,13 +10,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from twin.assumption import Assumption, checked, with_assumptions
 from twin.errors import MachineError
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
 from twin.programs import Settings
-from twin.rotary import outside_name, outside_text
+from twin.rotary import outside_name, outside_path, outside_text
 from twin.rotary_tables import tables_inside
 from twin.vocabulary.faults import faults_of, report
 
@@ -36,7 +37,8 @@ class Section(BaseModel):
 class Machine(Section):
     """[machine]: its name, the period at which position and velocity loop tick, and what of the file is only assumed.
 
-    assumed: sections and constants that nobody has stated or fitted, by path: `thermal`, `spindle.efficiency`
+    assumed: sections and constants that nobody has stated or fitted, by path: `thermal`, `spindle.efficiency`; those of
+    [assumed] too
     """
 
     name: str = Field(min_length=1)
@@ -263,6 +265,18 @@ class MachineFile(Section):
     noise: dict[str, NotNegative] = Field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
     learned: tuple[LearnedSection, ...] = ()
+    assumed: dict[str, Assumption] = Field(default_factory=dict)
+
+    @field_validator("assumed")
+    @classmethod
+    def _assumptions_are_of_what_is_stated(cls, given: dict[str, Assumption], info: ValidationInfo) -> dict[str, Assumption]:
+        checked(given, info.data)
+        return given
+
+    @model_validator(mode="before")
+    @classmethod
+    def _assumptions_count_everywhere(cls, given: Any) -> Any:
+        return with_assumptions(given) if isinstance(given, dict) else given
 
     @model_validator(mode="before")
     @classmethod
@@ -335,8 +349,12 @@ def _as_written(tables: dict[str, Any], error: ValidationError) -> list[dict[str
     except ValidationError as unscaled:
         error = unscaled
     faults: list[dict[str, Any]] = [dict(fault) for fault in error.errors(include_url=False)]
+    rotary = {letter: 1.0 for letter, axis in written.get("axes", {}).items() if isinstance(axis, dict) and "scale" in axis}
     for fault in faults:
         place = fault["loc"]
+        if place[:1] == ("assumed",):
+            fault["loc"] = tuple(outside_path(str(part), rotary) for part in place)
+            fault["msg"] = outside_text(fault["msg"], rotary, ())
         if len(place) > 1 and place[0] == "axes" and "scale" in written["axes"].get(place[1], ()):
             fault["loc"] = (*place[:-1], outside_name(str(place[-1]))[0])
             fault["msg"] = outside_text(fault["msg"], {str(place[1]): 1.0}, ())

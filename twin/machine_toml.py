@@ -6,6 +6,7 @@ from typing import Any
 
 import tomli_w
 
+from twin.assumption import without_assumptions
 from twin.learned.section import LEARNED
 from twin.machine import MachineFile
 from twin.rotary_tables import tables_outside
@@ -20,16 +21,17 @@ def machine_to_toml(machine: MachineFile) -> str:
     >>> machine_from_toml(machine_to_toml(machine)) == machine
     True
     """
-    values = machine.model_dump(mode="json", exclude_none=True)
+    values = without_assumptions(machine.model_dump(mode="json", exclude_none=True))
     learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop(LEARNED)]
     values["effects"] += learned
-    values["machine"] = {key: value for key, value in values["machine"].items() if value != []}
     if machine.rotary:
         values = tables_outside(values, machine.rotary)
-    effects = values.pop("effects")
+    values["machine"] = {key: value for key, value in values["machine"].items() if value != []}
+    effects, assumed = values.pop("effects"), values.pop("assumed")
     values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
     text = tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)
-    return text + "".join(_entry(entry) for entry in effects)
+    listed = "".join(f"{json.dumps(path)} = {_in_line(one)}\n" for path, one in assumed.items())
+    return text + (f"\n[assumed]\n{listed}" if listed else "") + "".join(_entry(entry) for entry in effects)
 
 
 def _entry(effect: Mapping[str, Any]) -> str:

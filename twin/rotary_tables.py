@@ -55,6 +55,14 @@ def tables_inside(tables: Mapping[str, Any], *, scaled: bool = True) -> Tables:
     }
     if isinstance(found.get("uncertainty"), dict):
         found["uncertainty"] = {inside_path(path, letters): value for path, value in found["uncertainty"].items()}
+    machine = found.get("machine")
+    if isinstance(machine, dict) and isinstance(machine.get("assumed"), list):
+        found["machine"] = machine | {"assumed": [inside_path(str(path), letters) for path in machine["assumed"]]}
+    if isinstance(found.get("assumed"), dict):
+        found["assumed"] = {
+            inside_path(path, letters): _range_times(one, _factor(path, letters) if scaled else 1.0)
+            for path, one in found["assumed"].items()
+        }
     if isinstance(found.get("effects"), list):
         found["effects"] = [_effect_inside(e, letters) if isinstance(e, dict) else e for e in found["effects"]]
     return found
@@ -71,6 +79,12 @@ def tables_outside(tables: Mapping[str, Any], letters: Letters) -> Tables:
         noise[TURNING_DISTURBANCE] = _over(noise.pop(DISTURBANCE), PER_NM * max(letters.values()))  # one for all axes
     found["noise"] = noise
     found["uncertainty"] = {outside_path(path, letters): value for path, value in tables.get("uncertainty", {}).items()}
+    named_only = tables["machine"].get("assumed", [])
+    found["machine"] = tables["machine"] | {"assumed": [outside_path(path, letters) for path in named_only]}
+    found["assumed"] = {
+        (named := outside_path(path, letters)): _range_times(one, 1.0 / _factor(named, letters))
+        for path, one in tables.get("assumed", {}).items()
+    }
     found["effects"] = [_effect_outside(effect, letters) for effect in tables.get("effects", [])]
     return found
 
@@ -100,6 +114,22 @@ def is_on(on: str, letters: Collection[str]) -> bool:
 def scale_on(on: str, letters: Letters) -> float:
     """Return the scale of the axis that this is, or is a signal of; 1 where it is another one."""
     return letters.get(on.partition("_")[0], 1.0)
+
+
+def _factor(path: str, letters: Letters) -> float:
+    """How many units inside one unit of the figure at a path of the file is."""
+    parts = path.split(".")
+    return inside_name(parts[-1], letters[parts[1]])[1] if len(parts) > 2 and parts[0] == "axes" and parts[1] in letters else 1.0
+
+
+def _range_times(entry: Any, factor: float) -> Any:
+    """An entry of [assumed] with its range in other units; it may have anything in it."""
+    if factor == 1.0 or not isinstance(entry, Mapping) or not isinstance(entry.get("range"), list | tuple):
+        return entry
+    return {
+        **entry,
+        "range": [float(f"{one * factor:.{DIGITS}g}") if isinstance(one, float | int) else one for one in entry["range"]],
+    }
 
 
 def _scale(axis: Mapping[str, Any]) -> float:

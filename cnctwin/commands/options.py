@@ -11,6 +11,14 @@ import typer
 WHEN = "2026-11-22T06:00 (UTC unless it names a zone), ms since 1970, or -8h for eight hours ago"
 FROM = f"Start of the stretch: {WHEN}"
 
+
+def file_or_class(given: Path) -> Path:
+    """Return the machine.toml that was given, or that of the class of machine that was named in its place."""
+    from cnctwin.machines.starters import CLASSES, machine_classes
+
+    return CLASSES / f"{given}.toml" if not given.exists() and str(given) in machine_classes() else given
+
+
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for a program to read")]
 Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 Config = Annotated[Path | None, typer.Option(help="TOML file with a table for each processor", show_default=False)]
@@ -33,7 +41,12 @@ KafkaConfig = Annotated[
 ]
 MachineDescription = Annotated[
     Path,
-    typer.Option("--machine", "--machine-file", help="Description of the machine: machine.toml, or the twin.toml of a diagnosis"),
+    typer.Option(
+        "--machine",
+        "--machine-file",
+        callback=file_or_class,
+        help="Description: machine.toml, the twin.toml of a diagnosis, or a class, as vmc-40",
+    ),
 ]
 Machines = Annotated[
     Path | None,

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 from cnctwin.plant.descriptions import Known, LiveDescriptions
 from processors.description import Role
+from twin.assumed import listed
 from twin.live.assumed import completed
 from twin.machine import MachineFile
 
@@ -80,7 +81,7 @@ def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[tuple[b
         yield True, f"{name}: description {found.version} is live{_since(found.since_ms)}{f', {said}' if said else ''}"
         if found.assumed:
             verb, them = ("is", "it") if len(found.assumed) == 1 else ("are", "them")
-            yield True, f"{name}: {', '.join(found.assumed)} {verb} assumed; {fit} {them}"
+            yield True, f"{name}: {listed(found.assumed)} {verb} assumed; {fit} {them}"
     if found.challenger:
         why = f": {found.challenger_why}" if found.challenger_why else ""
         waits = f"challenger {found.challenger} waits{_since(found.challenger_since_ms)}{why}"

@@ -14,9 +14,9 @@ from processors.description import Description
 from processors.production.calendar import Calendar, Slot, day_slot
 from processors.production.calendar_file import read_calendar_file
 from processors.production.config import Config
+from twin.assumed import is_assumed
 from twin.expected.expectation import Expectation
 from twin.expected.files import load_expectations
-from twin.live.assumed import is_assumed
 from twin.vocabulary.program_names import program_key
 
 CALENDAR, EXPECTATIONS = "calendar", "expectations"

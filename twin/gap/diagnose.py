@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.assumed import with_fitted
+from twin.assumed import narrowed_in_words, with_fitted
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of
@@ -148,6 +148,7 @@ def _motion(
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
     after = with_fitted(with_uncertainty(twins.after, known, named), known)
+    diagnosis = replace(diagnosis, notes=diagnosis.notes + narrowed_in_words(ground.machine, after))
     return Diagnosed(diagnosis, with_learned(after, learned), traces)
 
 

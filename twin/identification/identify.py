@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.assumed import with_fitted
+from twin.assumed import narrowed_in_words, with_fitted
 from twin.case import Case, Run, RunKind
 from twin.effects.added import added_effects
 from twin.errors import CaseError
@@ -80,6 +80,7 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     machine = _heat(machine, fits, known, unknown)
     told = {e.path: _relative(e) for e in known if e.identifiable and not e.path.endswith(("_asymmetry", "_delay"))}
     machine = with_fitted(machine.model_copy(update={"uncertainty": {**machine.uncertainty, **told}}), told)
+    notes += narrowed_in_words(case.machine, machine)
     progress("checking")
     judged = case.of(role="check") or fits
     gaps = free_run_gap(machine, judged, case.repeats())

@@ -5,6 +5,7 @@ Whatever rests on one of them says so.
 
 from collections.abc import Iterable
 
+from twin.assumed import is_assumed
 from twin.machine import MachineFile, SpindleDrive, Thermal
 
 THERMAL = Thermal(alpha_w_per_pct_rpm2=1.8e-8, beta_w_per_rpm=1.2e-3, resistance_k_per_w=0.18, capacity_j_per_k=14_500.0)
@@ -23,17 +24,6 @@ def completed(machine: MachineFile, section: str) -> MachineFile:
         return machine
     head = machine.machine.model_copy(update={"assumed": (*machine.machine.assumed, section)})
     return machine.model_copy(update={"machine": head, section: {"thermal": THERMAL, "spindle": SPINDLE}[section]})
-
-
-def is_assumed(machine: MachineFile, path: str) -> bool:
-    """Return True where nobody has stated or fitted this, or the section that it is in.
-
-    >>> from twin.machine import Machine
-    >>> vmc = MachineFile(machine=Machine(name="vmc", assumed=("spindle", "tools.3")))
-    >>> is_assumed(vmc, "spindle.efficiency"), is_assumed(vmc, "tools.31.diameter_mm")
-    (True, False)
-    """
-    return any(path == own or path.startswith(f"{own}.") for own in machine.machine.assumed)
 
 
 def assumed_of(machine: MachineFile, section: str, constants: Iterable[str]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.assumed import is_assumed
 from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.machine import MachineFile
@@ -45,7 +46,11 @@ def uncertain_constants(machine: MachineFile, tools: tuple[str, ...] = ("tool",)
         paths += [
             f"effects.{name}.{key}" for key, value in effect.checked(given).items() if value and not key.endswith("phase_rad")
         ]
-    found = [Uncertain(path, stated.get(path, stated.get("relative", DEFAULT_RELATIVE)), path in stated) for path in paths]
+
+    def is_known(path: str) -> bool:
+        return path in stated and not is_assumed(machine, path)
+
+    found = [Uncertain(path, stated.get(path, stated.get("relative", DEFAULT_RELATIVE)), is_known(path)) for path in paths]
     return tuple(one for one in found if one.relative > 0.0)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.assumed import assumed_in_words
 from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
 from twin.learned.standing import seconds_of
@@ -122,6 +123,8 @@ def simulate(
         if term.is_recording
     ]
     notes += _saturated(machine, response)
+    if assumed := assumed_in_words(machine):
+        notes.append(f"assumed, as nobody has stated or fitted it: {assumed}")
     learned_s = seconds_of(machine.learned, planned.total_s)
     if learned_s:
         notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")

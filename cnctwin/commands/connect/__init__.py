@@ -6,6 +6,7 @@ GROUP = CommandGroup(
     __name__,
     "Connect controls and recordings",
     {
+        "init": ("init:init", "Set up a plant: ask, try each answer, write its files"),
         "edge": ("edge:edge_app", "Draft, check and run the connection to a control"),
         "import": ("import_recording:import_recording", "Turn a recording into run logs"),
         "record": ("record:record", "Record a control's own oscilloscope"),

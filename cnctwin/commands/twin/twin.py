@@ -228,13 +228,15 @@ def _user(given: str | None) -> str:
 
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     """The document in lines for a person."""
+    from twin.assumed import listed
+
     live, challenger, score = found["live"], found["challenger"], found["score"]
     if live is None:
         yield f"{found['machine']}: nobody has described it yet; a challenger waits"
     else:
         why = f": {live['why']}" if live["why"] else ""
         yield f"{found['machine']}: {live['version']} is live since {moment_text(live['since'])} UTC, by {live['by']}{why}"
-        yield f"assumed: {', '.join(live['assumed']) or 'nothing'}"
+        yield f"assumed: {listed(live['assumed']) or 'nothing'}"
     if challenger is None:
         yield "no challenger waits"
     else:

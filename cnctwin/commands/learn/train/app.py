@@ -25,7 +25,7 @@ FILES = "Run logs (Parquet or CSV) as [NAME=]FILE; several files of a NAME are o
 @train_app.command("anomaly")
 def train_anomaly(
     files: Annotated[list[str], typer.Argument(help=FILES)],
-    out: Annotated[Path, typer.Option(help="Folder for the models: <out>/<machine>/current is what scores")],
+    out: Annotated[Path, typer.Option(help="Folder for the models: <out>/<machine>/current is what scores")] = Path("models"),
     features: Annotated[
         str,
         typer.Option(help="Signals, as a,b,c; else those of load, speed, feed, heat and vibration that all files have"),
@@ -87,6 +87,32 @@ def train_anomaly(
         at=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     training.train_anomaly(files, asked, out, as_json=as_json, console=Console())
+
+
+@train_app.command("sample")
+def train_sample(
+    out: Annotated[Path, typer.Option(help="Folder for the recordings")] = Path("sample-week"),
+    machines: Annotated[int, typer.Option(help="Machines of a cell", min=1, max=99)] = 2,
+    days: Annotated[int, typer.Option(help="From a Monday on", min=1, max=60)] = 7,
+    seed: Annotated[int, typer.Option(help="Seed for drawing the weeks; a different seed draws different weeks", min=0)] = 1,
+) -> None:
+    """Make a sample week of simulated machines in production, for `train anomaly` to learn from."""
+    from cnctwin.files.output import write
+    from cnctwin.processes.extras import needed_by
+    from cnctwin.terminal.spinner import working
+
+    with needed_by("the simulated machine", "twin"):
+        from cnctwin.training.anomaly.sample_week import SampleWeek, sample_weeks
+    made: list[SampleWeek] = []
+
+    def write_weeks() -> None:
+        for week in sample_weeks(out, machines, days, seed):
+            print(f"{week.file}: {days} days of {week.machine}, {week.rows} rows")
+            made.append(week)
+
+    with working("simulating"):
+        write(write_weeks, out)
+    print(f"train from it: cnctwin train anomaly {' '.join(f'{week.machine}={week.file}' for week in made)}")
 
 
 @train_app.command("check")

@@ -1,0 +1,29 @@
+"""A class of machine stands in for a machine.toml that nobody has written yet."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cnctwin.cli import app
+from cnctwin.commands.options import file_or_class
+from cnctwin.machines.starters import CLASSES
+
+PROGRAM = "G90 G94 G21\nG1 X2. F2000\nM30\n"
+
+
+def test_a_program_is_simulated_on_a_class_and_the_answer_says_what_is_assumed(tmp_path: Path) -> None:
+    program = tmp_path / "part.nc"
+    program.write_text(PROGRAM)
+    done = CliRunner().invoke(app, ["simulate", str(program), "--machine", "vmc-40", "--json"])
+    assert done.exit_code == 0, done.output
+    assert any("54 constants" in note for note in json.loads(done.output)["notes"])
+
+
+def test_a_file_of_that_name_goes_before_the_class(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert file_or_class(Path("vmc-40")) == CLASSES / "vmc-40.toml"
+    Path("vmc-40").write_text("")
+    assert file_or_class(Path("vmc-40")) == Path("vmc-40")
+    assert file_or_class(Path("mill.toml")) == Path("mill.toml")
