@@ -68,7 +68,7 @@ def _why_not(diagnosis: Mapping[str, Any], score: Score | None) -> str | None:
     if has_moved and score is not None and score.challenger <= BETTER_BY * score.live:
         return None
     if verdict == Verdict.HEALTHY:
-        return "the diagnosis finds no gap beyond what repeats"
+        return "the diagnosis finds no gap beyond the repeatability"
     return "the diagnosis finds no cause"
 
 

@@ -47,7 +47,7 @@ def test_what_is_better_on_other_runs_is_filed_in_plain_words(case: Path, tmp_pa
     ("gain", "diagnosis", "says"),
     [
         (0.0, {}, "no better on"),
-        (2.0, {"verdict": "healthy", "causes": []}, "no gap beyond what repeats"),
+        (2.0, {"verdict": "healthy", "causes": []}, "no gap beyond the repeatability"),
         (2.0, {"verdict": "unknown", "causes": [], "next_experiment": {"why": "switches the coolant"}}, "switches the coolant"),
     ],
 )
