@@ -33,7 +33,7 @@ def train_residual(
     seed: Annotated[int, typer.Option(min=0, help="Of all chance in the training")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON")] = False,
 ) -> None:
-    """Learn the error of the spindle's heat model. Exit code 1: no significant improvement on held-out time, so no model is written."""
+    """Learn the error of the spindle's heat model. Exit code 1: no significant improvement, so no model is written."""
     try:
         from cnctwin.training.residual import train as command
     except ImportError as error:
