@@ -230,7 +230,7 @@ def test_it_goes_back_by_itself_where_the_gap_grows_and_not_after_its_time() -> 
     worse = Standing(at_ms=T0_MS, live={"spindle_temp_c": 3.7})
     _, deed = walked(BY_HAND, after(0.1, worse), state=promoted(BY_HAND))
     assert isinstance(deed, Back) and (deed.version, deed.by) == (VB, "rule")
-    assert "3.7 floors, 3.1 before" in deed.why
+    assert "3.7 × the repeatability; before the promotion it was 3.1" in deed.why
     alike = Standing(at_ms=T0_MS, live={"spindle_temp_c": 3.5})
     assert walked(BY_HAND, after(0.1, alike), state=promoted(BY_HAND))[1] is None
     state, deed = walked(BY_HAND, after(24.1, worse), state=promoted(BY_HAND))
