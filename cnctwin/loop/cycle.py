@@ -210,7 +210,8 @@ def _shadow(config: LoopConfig, state: State, world: World) -> Stepped:
     shadow = shadow_of(config, state, world)
     if shadow is None or shadow.seconds < 3600.0 * config.shadow_hours or (sums := shadow.sums) is None:
         return state, None
-    gained = f"standing gap {floors(sums[0])} → {floors(sums[1])} floors in {hours(1000.0 * shadow.seconds)} beside the live one"
+    smaller = f"standing gap {floors(sums[0])} → {floors(sums[1])} × the repeatability"
+    gained = f"{smaller} in {hours(1000.0 * shadow.seconds)} beside the live one"
     if sums[1] >= sums[0] + config.promote_floors:
         return state, Withdraw(state.challenger, RULE, gained)
     if sums[0] - sums[1] < config.promote_floors or _worse_in(shadow.live, shadow.challenger):
@@ -238,7 +239,8 @@ def _back_of_itself(config: LoopConfig, state: State, world: World) -> Back | No
     before, after = (sum(gaps[signal] for signal in both) for gaps in (state.before, now))
     if after - before <= config.back_floors:
         return None
-    return Back(state.live, RULE, f"the standing gap is {floors(after)} floors, {floors(before)} before it was promoted")
+    why = f"the standing gap is {floors(after)} × the repeatability; before the promotion it was {floors(before)}"
+    return Back(state.live, RULE, why)
 
 
 def _is_taken_up(state: State, world: World) -> bool:

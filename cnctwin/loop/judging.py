@@ -60,7 +60,7 @@ def _why_not(diagnosis: Mapping[str, Any], score: Score | None) -> str | None:
     """Return why the corrected description is not filed; None where it is."""
     verdict = diagnosis.get("verdict")
     if score is not None and score.challenger >= score.live:
-        gaps = f"{score.challenger:.2f} floors against {score.live:.2f}"
+        gaps = f"{score.challenger:.2f} × the repeatability against {score.live:.2f}"
         return f"the corrected description is no better on {score.runs} runs that it was not fitted to: {gaps}"
     if verdict in (Verdict.EXPLAINED, Verdict.PARTLY):
         return None
@@ -68,7 +68,7 @@ def _why_not(diagnosis: Mapping[str, Any], score: Score | None) -> str | None:
     if has_moved and score is not None and score.challenger <= BETTER_BY * score.live:
         return None
     if verdict == Verdict.HEALTHY:
-        return "the diagnosis finds no gap beyond what repeats"
+        return "the diagnosis finds no gap beyond the repeatability"
     return "the diagnosis finds no cause"
 
 
@@ -126,7 +126,7 @@ def _largest(by_signal: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _closed(words: str, gap: Mapping[str, Any]) -> str:
-    return f": gap of {words} {_floors(gap, 'before'):.1f} → {_floors(gap, 'after'):.1f} floors"
+    return f": gap of {words} {_floors(gap, 'before'):.1f} → {_floors(gap, 'after'):.1f} × the repeatability"
 
 
 def _floors(gap: Mapping[str, Any], which: str) -> float:

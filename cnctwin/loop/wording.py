@@ -21,8 +21,8 @@ def promotion(last: Last, zone: tzinfo | None = None, *, is_since: bool = True) 
         return f"{last.says}: live{when}"
     of = f" of {last.words}" if last.words else ""
     if last.after is None:
-        return f"{last.says}: live{when}; the gap{of} was {floors(last.before)} floors"
-    return f"{last.says}: gap{of} {floors(last.before)} → {floors(last.after)} floors{when}"
+        return f"{last.says}: live{when}; the gap{of} was {floors(last.before)} × the repeatability"
+    return f"{last.says}: gap{of} {floors(last.before)} → {floors(last.after)} × the repeatability{when}"
 
 
 def floors(gap: float) -> str:

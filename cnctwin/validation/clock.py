@@ -83,7 +83,7 @@ def _placed(pair: Pair, grid: Grid, reach_s: tuple[float, float], of: str) -> tu
         return f"{by}: the best correlation is {peak:.2f}, over {pieces:.0f} independent pieces"
     if rival > RIVAL_MAX * peak:
         return (
-            f"{by}: two offsets fit alike ({peak:.3f} and {rival:.3f}), as where a part is made again and again; "
+            f"{by}: two offsets fit equally well ({peak:.3f} and {rival:.3f}), as with a series of equal parts; "
             "give t_s in seconds since 1970"
         )
     return z, Clock(float(offsets[best]) + every_s * _between(r, best), peak, rival, by)

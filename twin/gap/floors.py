@@ -287,7 +287,7 @@ def _certainty(error: Mapping[Key, float]) -> tuple[str, ...]:
         return ()
     best, worst = min(error.values()), max(error.values())
     (signal, regime), _ = max(error.items(), key=lambda item: item[1])
-    return (f"the floors are known to {100 * best:.0f} to {100 * worst:.0f} % (least: {signal}, {regime})",)
+    return (f"the repeatability is known to {100 * best:.0f} to {100 * worst:.0f} % (least: {signal}, {regime})",)
 
 
 def lap_of(log: RunLog) -> int:

@@ -103,7 +103,7 @@ def _cell(signal: _Signal, number: int, regime: str, share: float, p: float, dis
     where_to = f"{signal_words(signal.name)} {regime_words(regime)}"
     mean, size = float(signal.mean[number]), float(signal.rms[number])
     if not discovered:
-        sentence = f"{where_to}: no more than what repeats (rms {figure(size, signal.unit)})"
+        sentence = f"{where_to}: within the repeatability (rms {figure(size, signal.unit)})"
     elif effect >= 0.5 * rms:
         says = f"mean {figure(mean, signal.unit)} (twin minus recording), {times_floor(effect)}"
         sentence = f"{percent(share)} of the gap in {group_of(signal.name)} is in {where_to}: {says}"

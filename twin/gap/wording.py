@@ -124,9 +124,9 @@ def times_floor(size: float) -> str:
     """A size in floors.
 
     >>> times_floor(12.34), times_floor(1.26)
-    ('12 times what repeats', '1.3 times what repeats')
+    ('12 × the repeatability', '1.3 × the repeatability')
     """
-    return f"{digits(size)} times what repeats"
+    return f"{digits(size)} × the repeatability"
 
 
 def percent(part: float) -> str:

@@ -174,8 +174,8 @@ def _unknown(letter: str, found: AxisFit, forced: bool) -> list[str]:
     ]
     if not forced:
         said.append(
-            f"axes.{letter}: mass, friction and torque constant are known up to one common factor, since no run has a known "
-            "force on this axis; the torque constant stays as stated"
+            f"axes.{letter}: only the ratios of mass, friction and torque constant are known, because no run has a known force "
+            "on this axis; the torque constant stays as stated"
         )
     return said
 

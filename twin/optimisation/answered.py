@@ -153,7 +153,7 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
     if before.over:
         parts.append(f"{_lines_of(before.over)} above a limit before, now {after.over or 'none'}")
-    what = "the exact optimum" if bound.exact else "a bound that no program is below"
+    what = "the exact optimum" if bound.exact else "a bound that no program can beat"
     which = (
         f"the front's cheapest {_part(bound.distance)}"
         if question.objective is Objective.PARETO

@@ -53,9 +53,9 @@ def bound_of(problem: Problem, objective: Objective, value: float) -> Bound:
     least = min(least, here)  # a program is there, so it is no bound that is above it
     each = "each line" if all(len(rows) == 1 for rows in problem.groups.rows) else "each group of lines that share a speed"
     how = (
-        f"{each} at its own best, which a program reaches: the control is ideal, and speeds change for nothing"
+        f"{each} at its own optimum, which a program reaches: the control is ideal, and changes of speed take no time"
         if exact
-        else f"{each} at its own best while speeds change for nothing; changes and corners take a program more"
+        else f"{each} at its own optimum, without the time that changes of speed and corners take"
     )
     return Bound(value=least, distance=max(value / least - 1.0, 0.0), exact=exact, how=how)
 

@@ -81,11 +81,15 @@ def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
             span = ("–" if at_ms is None else moment_text(at_ms) for at_ms in (about["from_ms"], about["to_ms"]))
             table.add_row(name, str(about["signals"]), *span)
         console.print(table)
-        left = "not known yet" if status.days_left is None else f"{status.days_left:.0f} days"
+        left = (
+            "the day on which the disk is full is not known yet"
+            if status.days_left is None
+            else f"room for {status.days_left:.0f} more days before anything is deleted early"
+        )
         a_sample = f" ({status.bytes / status.samples:.2f} bytes a sample)" if status.samples else ""
         kept = f"{status.samples} samples in {status.bytes / 1e6:.1f} MB{a_sample}"
         pinned = f"{len(pins)} pin" + "s" * (len(pins) != 1)
-        console.print(f"{kept}; nothing goes before its time for {left}; {pinned}", highlight=False, soft_wrap=True)
+        console.print(f"{kept}; {left}; {pinned}", highlight=False, soft_wrap=True)
         if holes:
             console.print(f"rows of edges are missing: {holes_text(holes)}", markup=False, highlight=False, soft_wrap=True)
         if status.trouble:

@@ -58,7 +58,7 @@ def score(
     case: Annotated[Path, typer.Argument(help="The folder with the recorded runs")],
     as_json: AsJson = False,
 ) -> None:
-    """Print the gap of any twin on all runs of a case: rms over what repeats, of all signals and by signal."""
+    """Print the gap of any twin on all runs of a case: rms over the repeatability, for all signals and by signal."""
     with needed_by("the twin", "twin"):
         from twin.case import read_case
         from twin.gap.score_of import score_of
@@ -71,7 +71,7 @@ def score(
     if as_json or not console.is_terminal:
         sys.stdout.write(json.dumps(score_json(found)) + "\n")
         return
-    signals = Table(title=f"{machine.machine.name} on {recorded.name}: {found.gap:.3g} × what repeats", title_justify="left")
+    signals = Table(title=f"{machine.machine.name} on {recorded.name}: {found.gap:.3g} × the repeatability", title_justify="left")
     for column in ("signal", "rms", "floor", "unit", "×"):
         signals.add_column(column, justify="left" if column in ("signal", "unit") else "right")
     for signal, one in found.by_signal.items():
@@ -130,7 +130,7 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
     console.print(found.sentence, style="bold", highlight=False, soft_wrap=True)
     gap = found.gap
     console.print(
-        f"gap {gap.before:.3g} → {gap.after:.3g} × what repeats; closed {100 * gap.closure:.1f} % "
+        f"gap {gap.before:.3g} → {gap.after:.3g} × the repeatability; closed {100 * gap.closure:.1f} % "
         f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}), on runs {unseen}; "
         f"as stated {gap.as_stated:.3g}",
         highlight=False,

@@ -243,9 +243,9 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         said = f": {challenger['sentence']}" if challenger["sentence"] else ""
         yield f"challenger: {challenger['version']}{said}"
         if challenger["gap_before"] is not None and challenger["gap_after"] is not None:
-            yield f"gap by its diagnosis: {challenger['gap_before']:.3g} → {challenger['gap_after']:.3g} floors"
+            yield f"gap by its diagnosis: {challenger['gap_before']:.3g} → {challenger['gap_after']:.3g} × the repeatability"
         if score is not None:
-            both = f"live {score['live']:.3g}, challenger {score['challenger']:.3g} floors"
+            both = f"live {score['live']:.3g}, challenger {score['challenger']:.3g} × the repeatability"
             yield f"gap on {score['runs']} runs that were not fitted: {both}"
         yield from _shadow(found["shadow"], found["standing"])
         yield "it may be promoted" if found["may_promote"] else f"it may not be promoted: {found['why_not']}"
@@ -269,7 +269,7 @@ def _shadow(shadow: Mapping[str, Any] | None, standing: Mapping[str, Any] | None
 def _gaps(standing: Mapping[str, Any] | None) -> Iterator[str]:
     for signal, gaps in (standing or {}).items():
         known = [f"{which} {gap:.2f}" for which in ("live", "challenger") if (gap := gaps[which]) is not None]
-        yield f"standing gap of {signal}: {', '.join(known)} floors"
+        yield f"standing gap of {signal}: {', '.join(known)} × the repeatability"
 
 
 def _standing(broker: "BrokerAddress | None", group: str, machine: str, wait_s: float) -> dict[str, Any] | None:

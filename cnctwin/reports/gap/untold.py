@@ -58,7 +58,7 @@ def next_experiment(diagnosis: Diagnosis) -> Markup:
     if known(given.seconds) and given.seconds > 0:
         facts.append(f"It takes about {figure(given.seconds, 2)} s.")
     if known(given.separation) and given.separation > 0:
-        facts.append(f"The hypotheses then lie {times(given.separation)} floors apart.")
+        facts.append(f"The hypotheses then lie {times(given.separation)} times the repeatability apart.")
     facts.append("Look at the program before it runs: it knows the stated travel, not what is clamped on the table.")
     button = tag("button", "Copy", type="button", class_="copy", data_copy="nc", hidden=True)
     code = tag(

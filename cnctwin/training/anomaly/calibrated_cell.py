@@ -181,7 +181,7 @@ def _provisional(machine: str, raw: Floats, asked: TrainingSettings) -> Calibrat
     spread = MAD_TO_SD * float(np.median(np.abs(raw - center)))
     if not spread > 0.0:
         raise UsageError(
-            f"{machine}: half of the scores are the same, {center:.3g}: the model tells them not apart; record more, "
+            f"{machine}: half of the scores are equal ({center:.3g}), so the model cannot tell normal from unusual; record more, "
             "or choose other --features"
         )
     unfitted: dict[str, Any] = {"threshold": 1.0, "estimate": 0.0, "low": 0.0, "high": 0.0, "hours": 0.0, "is_extrapolated": True}

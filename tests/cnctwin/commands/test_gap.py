@@ -93,7 +93,7 @@ def test_diagnose_prints_what_a_person_reads(folder: Path, cnctwin: Cnctwin) -> 
     code, out, err = cnctwin("gap", "diagnose", again, "--out", again / "out")
     assert code == 0, err
     assert out.startswith("Healthy")
-    assert "× what repeats" in out
+    assert "× the repeatability" in out
     assert "diagnosis.json, report.html, twin.toml in" in out
 
 

@@ -125,7 +125,7 @@ def test_with_a_broker_it_shows_the_standing_gap_of_both(
         assert ran(monkeypatch, "twin", "show", "vmc", *place, "--wait", "30") == 0
     finally:
         edge.stop()
-    assert "standing gap of spindle_temp_c: live 3.10, challenger 1.10 floors" in capsys.readouterr().out
+    assert "standing gap of spindle_temp_c: live 3.10, challenger 1.10 × the repeatability" in capsys.readouterr().out
 
 
 def test_a_diagnosis_of_ones_own_waits_as_the_challenger_with_its_score(

@@ -21,7 +21,7 @@ HOUR_MS = 3_600_000
 LIVE, BETTER = "[machine]\nname = 'vmc'\n", "[machine]\nname = 'vmc'\nservo_period_s = 0.002\n"
 VA, VB = version_of(LIVE), version_of(BETTER)
 CARD = Card(
-    sentence="coolant cools: gap 3.1 → 1.1 floors",
+    sentence="coolant cools: gap 3.1 → 1.1 × the repeatability",
     says="coolant cools",
     signal="spindle_temp_c",
     words="the spindle temperature",
@@ -154,7 +154,7 @@ def test_by_rule_it_is_promoted_after_its_time_beside_the_live_one() -> None:
     state, deed = walked(BY_RULE, shadowed(1.01), state=state)
     assert isinstance(deed, MakeLive) and (deed.version, deed.by) == (VB, "rule")
     assert deed.shadow is not None and why_not(VB, VA, None, deed.shadow) is None
-    assert "3.1 → 1.0 floors" in deed.why
+    assert "3.1 → 1.0 × the repeatability" in deed.why
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def test_a_promotion_is_told_with_the_gap_before_and_after() -> None:
     state = promoted(BY_HAND)
     assert state.step is StepName.PROMOTED and dict(state.before) == {"spindle_temp_c": 3.1}
     state, deed = walked(BY_HAND, after(0.1), state=state)
-    assert deed is None and "coolant cools: gap of the spindle temperature 3.1 → 1.0 floors since " in state.text
+    assert deed is None and "coolant cools: gap of the spindle temperature 3.1 → 1.0 × the repeatability since " in state.text
     assert state.last is not None and (state.last.before, state.last.after) == (3.1, 1.0)
     assert walked(BY_HAND, after(25.0), state=state)[0].step is StepName.WATCHING
 
@@ -230,7 +230,7 @@ def test_it_goes_back_by_itself_where_the_gap_grows_and_not_after_its_time() -> 
     worse = Standing(at_ms=T0_MS, live={"spindle_temp_c": 3.7})
     _, deed = walked(BY_HAND, after(0.1, worse), state=promoted(BY_HAND))
     assert isinstance(deed, Back) and (deed.version, deed.by) == (VB, "rule")
-    assert "3.7 floors, 3.1 before" in deed.why
+    assert "3.7 × the repeatability; before the promotion it was 3.1" in deed.why
     alike = Standing(at_ms=T0_MS, live={"spindle_temp_c": 3.5})
     assert walked(BY_HAND, after(0.1, alike), state=promoted(BY_HAND))[1] is None
     state, deed = walked(BY_HAND, after(24.1, worse), state=promoted(BY_HAND))

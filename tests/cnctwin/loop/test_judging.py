@@ -39,7 +39,7 @@ def test_what_is_better_on_other_runs_is_filed_in_plain_words(case: Path, tmp_pa
     assert found.is_better and found.card.score is not None
     assert found.card.score.challenger < found.card.score.live and found.card.score.runs > 0
     assert found.card.sentence.startswith("coolant cools (or ")
-    assert found.card.sentence.endswith(": gap of the spindle temperature 3.1 → 1.1 floors")
+    assert found.card.sentence.endswith(": gap of the spindle temperature 3.1 → 1.1 × the repeatability")
     assert found.card.signal == "spindle_temp_c"
 
 
@@ -47,7 +47,7 @@ def test_what_is_better_on_other_runs_is_filed_in_plain_words(case: Path, tmp_pa
     ("gain", "diagnosis", "says"),
     [
         (0.0, {}, "no better on"),
-        (2.0, {"verdict": "healthy", "causes": []}, "no gap beyond what repeats"),
+        (2.0, {"verdict": "healthy", "causes": []}, "no gap beyond the repeatability"),
         (2.0, {"verdict": "unknown", "causes": [], "next_experiment": {"why": "switches the coolant"}}, "switches the coolant"),
     ],
 )

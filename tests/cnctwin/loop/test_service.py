@@ -42,8 +42,8 @@ def test_an_open_gap_is_diagnosed_promoted_by_a_person_and_taken_back(plant: Loo
     plant.until_step("promoted")
     assert (plant.machines / "vmc.toml").read_text() == BETTER
     plant.until(lambda: (plant.document["last"] or {}).get("after") == 1.0, "the gap after")
-    assert plant.document["last"]["text"] == "coolant cools: gap of the temperature 3.1 → 1.0 floors"
-    assert plant.document["text"].startswith("coolant cools: gap of the temperature 3.1 → 1.0 floors since ")
+    assert plant.document["last"]["text"] == "coolant cools: gap of the temperature 3.1 → 1.0 × the repeatability"
+    assert plant.document["text"].startswith("coolant cools: gap of the temperature 3.1 → 1.0 × the repeatability since ")
     plant.ask("back", version=VB, id="third")
     plant.ask("back", version=VB, id="third")
     plant.until(lambda: plant.own.live_version() == VA, "the way back")
@@ -71,7 +71,7 @@ def test_a_description_that_makes_it_worse_goes_back_by_itself(plant: LoopPlant)
     plant.ask("promote", version=VB, id="one")
     plant.until(lambda: any(str(step.step) == "back" for step in plant.own.steps()), "the way back")
     step = next(step for step in plant.own.steps() if str(step.step) == "back")
-    assert step.by == "rule" and "before it was promoted" in step.why
+    assert step.by == "rule" and "before the promotion it was" in step.why
     assert plant.own.live_version() == VA
 
 

@@ -16,7 +16,7 @@ def diagnosis() -> dict[str, Any]:
                 "regime": "constant speed -",
                 "share": 0.46,
                 "rms": 60.8,
-                "sentence": "46 % of the gap in torque is in the Z torque at constant speed in −, 61 times what repeats",
+                "sentence": "46 % of the gap in torque is in the Z torque at constant speed in −, 61 × the repeatability",
                 **cell,
             },
             {
@@ -24,7 +24,7 @@ def diagnosis() -> dict[str, Any]:
                 "regime": "rest",
                 "share": 0.39,
                 "rms": 14.1,
-                "sentence": "39 % of the gap in position is in the Z position at standstill: mean 7.0 µm, 23 times what repeats",
+                "sentence": "39 % of the gap in position is in the Z position at standstill: mean 7.0 µm, 23 × the repeatability",
                 **cell,
             },
             {

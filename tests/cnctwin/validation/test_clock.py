@@ -40,7 +40,11 @@ def test_a_part_that_is_made_again_and_again_fits_itself_every_cycle() -> None:
     machine = Track(np.arange(4000.0), np.tile(one, 10))
     cut = part_of(machine, 900, 1300, 0.0, 0.05)
     ambiguous = placed([Pair("load", cut, machine)], 0.0, 4000.0, 1.0, (0.0, 4000.0))
-    assert isinstance(ambiguous, str) and "two offsets fit alike" in ambiguous and "give t_s in seconds since 1970" in ambiguous
+    assert (
+        isinstance(ambiguous, str)
+        and "two offsets fit equally well" in ambiguous
+        and "give t_s in seconds since 1970" in ambiguous
+    )
     near = placed([Pair("load", cut, machine)], 0.0, 4000.0, 1.0, (850.0, 950.0))
     assert isinstance(near, Clock) and near.offset_s == pytest.approx(900.0, abs=0.5)
 

@@ -23,7 +23,7 @@ def test_a_gap_at_rest_is_found_at_rest() -> None:
     assert first.effect_size == pytest.approx(12.0, rel=0.05)
     assert first.share > 0.95
     assert first.sentence.endswith(
-        "of the gap in torque is in the X torque at standstill: mean −0.12 A (twin minus recording), 12 times what repeats"
+        "of the gap in torque is in the X torque at standstill: mean −0.12 A (twin minus recording), 12 × the repeatability"
     )
     assert not any(cell.discovered for cell in others)
 

@@ -96,7 +96,7 @@ def test_the_constants_of_a_known_machine_are_inside_their_intervals(known_machi
 
 def test_what_air_runs_cannot_know_is_said(known_machine: Identification) -> None:
     said = " ".join(known_machine.unknown)
-    assert "mass, friction and torque constant are known up to one common factor" in said
+    assert "only the ratios of mass, friction and torque constant are known" in said
     assert "tool: K_t and K_e: no run cuts on a dynamometer" in said
     assert "three combinations (alpha/C, beta/C and R·C)" in said
 

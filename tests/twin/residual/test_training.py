@@ -1,4 +1,4 @@
-"""Training: judged on later time, chosen without it, and refused where there is no gain that is surely one."""
+"""Training: judged on later time, chosen without it, and refused where there is no significant improvement."""
 
 from dataclasses import replace
 

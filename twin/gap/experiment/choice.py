@@ -245,7 +245,7 @@ def _answer(option: _Option, hypotheses: Sequence[Hypothesis], more: str) -> Nex
     left += " and others" if untold[1:] else ""
     separated = _names(e for pair in option.apart for e in (pair.first, pair.second))
     why = (
-        f"separates {separated}: {option.trial.snippet.does}; expected difference {digits(nearest.largest)} times what repeats "
+        f"separates {separated}: {option.trial.snippet.does}; expected difference {digits(nearest.largest)} × the repeatability "
         f"in {nearest.signal}, {digits(nearest.floors)} over the program with what the constants can hide{left}{more}"
     )
     return NextExperiment(why, option.trial.snippet.program(), round(option.trial.seconds, 1), round(nearest.floors, 2))
@@ -259,6 +259,6 @@ def _nothing(hypotheses: Sequence[Hypothesis], best: _Option | None) -> str:
     pair = max(best.pairs, key=lambda p: p.floors)
     return (
         f"no program of the menu separates {names}: the best, {best.trial.snippet.does}, is expected to show "
-        f"{digits(pair.largest)} times what repeats in {pair.signal}, {digits(pair.floors)} over the program with what the "
+        f"{digits(pair.largest)} × the repeatability in {pair.signal}, {digits(pair.floors)} over the program with what the "
         f"constants can hide; it takes {digits(SEPARATED)}"
     )

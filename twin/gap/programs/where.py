@@ -167,7 +167,7 @@ class _Sorting:
         took = f"{digits(recorded)} s in a run, {_more(each)}"
         words = f"{percent(share)} of the time gap is in {name}: {took}"
         if not discovered:
-            words = f"{name}: no more than what repeats ({took})"
+            words = f"{name}: within the repeatability ({took})"
         rms = float(np.sqrt(np.mean(gap**2))) / self.floor_s
         return Cell(self.signal, name, share, abs(float(gap.mean())) / self.floor_s, rms, p, discovered, words)
 

@@ -32,7 +32,7 @@ def train_residual(
     seed: Seed = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Learn what the physics of the spindle's temperature gets wrong. Exit code 1: no gain that is surely one, so no model."""
+    """Learn the error of the spindle's heat model. Exit code 1: no significant improvement, so no model is written."""
     try:
         from cnctwin.training.residual import train as command
     except ImportError as error:

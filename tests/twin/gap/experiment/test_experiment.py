@@ -92,7 +92,7 @@ def test_gravity_and_friction_that_differs_by_direction_are_told_apart() -> None
     planned = plan(path_from_moves(interpret(found.program)), EXACT.program)
     assert found.seconds == pytest.approx(planned.total_s, abs=0.05)
     assert found.why.startswith("separates gravity from direction_friction on x: ")
-    assert re.search(r"expected difference [\d.]+ times what repeats in x_", found.why)
+    assert re.search(r"expected difference [\d.]+ × the repeatability in x_", found.why)
 
 
 def test_constants_that_are_not_known_can_hide_a_difference() -> None:

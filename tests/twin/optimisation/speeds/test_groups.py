@@ -137,7 +137,7 @@ def test_where_the_control_is_ideal_the_bound_of_groups_is_reached(objective: Ob
     answer = optimise(question.with_(speed_changes=IN_AIR, **SHORT))
     assert answer.bound.exact
     assert answer.bound.distance < 1e-3
-    assert answer.bound.how.startswith("each group of lines that share a speed at its own best, which a program reaches")
+    assert answer.bound.how.startswith("each group of lines that share a speed at its own optimum, which a program reaches")
 
 
 def test_a_speed_that_changes_in_the_material_is_said_with_the_way_out_and_what_it_takes() -> None:

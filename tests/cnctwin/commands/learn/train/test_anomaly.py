@@ -236,7 +236,7 @@ def broken(folder: Path, tmp_path: Path) -> dict[str, tuple[list[str | Path], st
             "no spindle_load_pct, feed_mm_min in it; there are spindle_rpm: choose with --features",
         ),
         "too short": ([tmp_path / "short.csv"], "rows have all features: at least 64"),
-        "nothing moves": ([tmp_path / "still.csv"], "the model tells them not apart"),
+        "nothing moves": ([tmp_path / "still.csv"], "the model cannot tell normal from unusual"),
         "other numbers of runs": ([*a, *a, *named(folder, "b")], "different numbers of runs .a 2, b 1."),
         "no common time": ([*a, f"b={tmp_path / 'later.parquet'}"], "have no time in common"),
         "no such detector": ([*a, "--detector", "magic"], "there is no detector 'magic'"),
