@@ -325,7 +325,7 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
         key = ".".join(str(part) for part in _in_file(first["loc"], raw))
         more = f" (and {len(rest)} more)" if rest else ""
         if first["type"] == "extra_forbidden":
-            raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
+            raise MachineError(f"{source}: {key} is not known; docs/reference/machine.md lists what is{more}") from None
         said = first["msg"].removeprefix("Value error, ")
         raise MachineError(f"{source}: {key}: {said}{_shown(first['input'])}{more}") from None
     except MachineError as error:

@@ -88,7 +88,7 @@ def check(
         typer.Option(help="A folder for what is done: with the same cases and seed, the check goes on where it stopped"),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes, one thread each; as many as there are cores", min=1)] = None,
-    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/jobs.md)")] = None,
+    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/how-to/jobs.md)")] = None,
     as_json: AsJson = False,
 ) -> None:
     """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size.

@@ -53,7 +53,7 @@ def optimise(
     population: Annotated[int, typer.Option(help="Of each island, even", min=4)] = 64,
     islands: Annotated[int, typer.Option(help="Populations beside each other", min=1)] = 2,
     workers: Annotated[int, typer.Option(help="Processes for the islands", min=1)] = 1,
-    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/jobs.md)")] = None,
+    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/how-to/jobs.md)")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Do not go on with a search that was stopped")] = False,
     no_resimulation: Annotated[
         bool, typer.Option("--no-resimulation", help="Do not run both programs on the whole twin")

@@ -120,7 +120,7 @@ class ColumnMap(_Table):
             column = run_column(name)
             if column is None:
                 raise ValueError(
-                    f"columns.{name} is no column of a run log and no canonical signal; docs/recording.md lists them"
+                    f"columns.{name} is no column of a run log and no canonical signal; docs/how-to/recording.md lists them"
                 )
             into = unit_of(column)
             if options.unit is not None and conversion(options.unit, into) is None:

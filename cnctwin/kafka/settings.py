@@ -23,7 +23,7 @@ Conf = dict[str, Any]
 
 
 class KafkaSettings(BaseModel):
-    """See the module and docs/kafka.md.
+    """See the module and docs/how-to/kafka.md.
 
     partitions: of each topic; machines stay where they are only while it does not change
     retention_hours: of readings, cells and results

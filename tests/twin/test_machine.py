@@ -75,7 +75,7 @@ def test_a_wrong_description_gets_one_line_with_key_and_value(text: str, complai
 
 
 def test_the_example_of_the_page_is_a_machine() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "machine.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "machine.md").read_text(encoding="utf-8")
     machine = machine_from_toml(page.split("```toml\n")[1].split("```")[0])
     check_effects(machine)
     assert set(type(machine).model_fields) == machine.model_fields_set, "a section is missing in the example"

@@ -33,5 +33,7 @@ def look(config: Config) -> tuple[Sweep, SampleSet]:
     connection = FocasConnection(config, wait=lambda _: None)
     raw = connection.once()
     if raw is None:
-        raise ConnectionLostError(f"{connection.last_error}; {_way_out(config, connection.last_error)} (docs/edge-focas.md)")
+        raise ConnectionLostError(
+            f"{connection.last_error}; {_way_out(config, connection.last_error)} (docs/how-to/edge-focas.md)"
+        )
     return Sweep.decode(raw), parse(config, start(config), raw)[1]

@@ -1,4 +1,4 @@
-"""Who may ask: each rule of docs/api.md, by itself and on the application."""
+"""Who may ask: each rule of docs/reference/api.md, by itself and on the application."""
 
 import http.cookies
 import time
