@@ -16,14 +16,24 @@ html_show_sphinx = False
 myst_heading_anchors = 4
 highlight_language = "none"  # a block that names no language is a terminal's
 LISTED = re.compile(r"^[*|-].*?\]\(((?!\w+:)[^)#\s]+\.md)\)", re.MULTILINE)
-LINK = re.compile(r"\[([^\]\n]+)\]\(((?:\.\./)+(?!\w+:)[^)#\s]+)\)")
+OUTSIDE = re.compile(r"\[`?([^\]\n`]+)`?\]\(((?:\.\./)+(?!\w+:)[^)#\s]+)(?:#[^)\s]*)?\)")
+NAMES = {"file", "files", "File", "Files", "configuration", "code"}
+"""Texts of links that say nothing without the link."""
 DOCS = Path(__file__).parent
 
 
 def adapt(_app: Any, docname: str, source: list[str]) -> None:
-    """Take what a Git host shows as it stands to a site: an index page's list is its sidebar, and a folder of the code has no page."""
+    """Make a page of a Git host one of a site: a link to the code is a name, and the list of an index page is the sidebar."""
     page = (DOCS / docname).parent
-    source[0] = LINK.sub(lambda found: f"`{found[1]}`" if (page / found[2]).is_dir() else found[0], source[0])
+
+    def named(found: re.Match[str]) -> str:
+        target = (page / found[2]).resolve()
+        inside = target.is_relative_to(DOCS)
+        return (
+            found[0] if inside else f"{found[1]} (`{target.relative_to(DOCS.parent)}`)" if found[1] in NAMES else f"`{found[1]}`"
+        )
+
+    source[0] = OUTSIDE.sub(named, source[0])
     if docname.rpartition("/")[2] == "index":
         pages = "\n".join(dict.fromkeys(LISTED.findall(source[0])))
         source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"

@@ -1,22 +1,10 @@
-#!/usr/bin/env python3
-"""Write docs/reference/effects.md: the catalogue of effects, from what each declares.
+"""docs/reference/effects.md: the catalogue of effects, from what each declares."""
 
-With --check nothing is written; exits 1 where the page is out of date.
-"""
-
-import argparse
-import sys
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "reference" / "effects.md"
-sys.path.insert(0, str(ROOT))
-
-from twin.effects.catalogue import catalogue  # noqa: E402
-from twin.effects.effect import On, Parameter  # noqa: E402
-from twin.learned.sites import AXIS_SITES, MACHINE_READINGS, READINGS, unit_at  # noqa: E402
-from twin.learned.words import TIME, WORDS, LearnedSite  # noqa: E402
-from twin.sites import Site  # noqa: E402
+from twin.effects.catalogue import catalogue
+from twin.effects.effect import On, Parameter
+from twin.learned.sites import AXIS_SITES, MACHINE_READINGS, READINGS, unit_at
+from twin.learned.words import TIME, WORDS, LearnedSite
+from twin.sites import Site
 
 WHAT = {
     LearnedSite.CONTROLLER: "the torque command",
@@ -62,7 +50,7 @@ parameters = { force_n = -310.0 }
 
 `on` is an axis letter, a column of the run log, or empty; an effect of the cut may be on one of `[tools]`, by its number. At its null
 value an effect is not there, bit for bit; a parameter without one has no say while the others are null. This page is written by
-`scripts/effects`.
+`scripts/reference`.
 
 ## Learned terms
 What a machine has and no catalogue names is a table, found by [gap diagnose](../explanation/gap.md) and written beside the effects. An entry of
@@ -117,20 +105,3 @@ def page() -> str:
 def _parameter(p: Parameter) -> str:
     null = "no null value" if p.null is None else f"null {p.null:g}"
     return f"`{p.name}`{' ' + p.unit if p.unit else ''}: {p.meaning}; {null}, {p.low:g} to {p.high:g}".replace("|", "\\|")
-
-
-def main() -> int:
-    """Write the page, or say whether it is up to date."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 where the page is out of date")
-    if parser.parse_args().check:
-        if PAGE.read_text(encoding="utf-8") == page():
-            return 0
-        print(f"{PAGE.relative_to(ROOT)} is out of date; run scripts/effects", file=sys.stderr)
-        return 1
-    PAGE.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
