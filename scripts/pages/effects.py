@@ -38,7 +38,8 @@ SITES = [f"| `{site}` | {_placed(site)} | {WHAT[site]}, {unit_at(site)} |" for s
 HEAD = """\
 # Effects
 
-What a machine may have that the nominal model ([simulator.md](../explanation/simulator.md)) has not. Each is one file in `twin/effects/`, found
+For whoever reads a diagnosis or gives a simulated machine a fault: what a machine may have beyond the nominal
+model ([the simulated machine](../explanation/simulator.md)). Each effect is one file in `twin/effects/`, found
 by discovery, and written into a `machine.toml` like this:
 
 ```toml

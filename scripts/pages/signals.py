@@ -5,7 +5,7 @@ from twin.vocabulary.signals import AXES, CHOSEN, CHOSEN_NAME, SIGNALS, Signal
 HEAD = """\
 # Signals
 
-Each control says the same things in its own words and units. An edge translates them to these canonical signals: one name, one unit, one
+For whoever reads values from the broker. Each control says the same things in its own words and units; an edge translates them to these canonical signals: one name, one unit, one
 meaning. A number outside its range is null with quality BAD and keeps the figure in the reason
 ([edge-mtconnect.md](../how-to/edge-mtconnect.md)); a text outside its words is null with the word as reason. A signal that a control does
 not offer is not published. `<axis>` is a letter, with a digit where a control has several of one letter: `axis_z4_pos_mm`.
