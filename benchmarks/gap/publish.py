@@ -1,4 +1,4 @@
-"""The tables of docs/explanation/gap.md from the folder of a blind check, as Markdown, and its size curve as a picture.
+"""The tables of docs/explanation/gap-results.md from the folder of a blind check, as Markdown, and its size curve as a picture.
 
     .venv/bin/python benchmarks/gap/publish.py FOLDER [--left-out FOLDER] [--picture docs/pictures/gap-size-curve.svg]
 
@@ -88,7 +88,7 @@ def left_out(folder: Path) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description="The tables of docs/explanation/gap.md from the folder of a blind check.")
+    parser = argparse.ArgumentParser(description="The tables of docs/explanation/gap-results.md.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--left-out", type=Path)
     parser.add_argument("--picture", type=Path)

@@ -9,7 +9,7 @@ HEAD = """\
 # Topics
 
 For whoever writes a client, or rights on a broker: the plain MQTT topics beside Sparkplug's. What is published as Sparkplug B, and what values look like, is in
-[Sparkplug on the broker](sparkplug.md). A topic that ends in `/` is a prefix; what follows it is named first in its meaning. This page is written by
+[Sparkplug on the broker](sparkplug.md). `…` stands for what follows a prefix; its meaning names that first. This page is written by
 `scripts/reference` from [`twin/vocabulary/topics.py`](../../twin/vocabulary/topics.py).
 
 | topic | name in the code | meaning |
@@ -29,5 +29,5 @@ def page() -> str:
         said = following.value if isinstance(following, ast.Expr) else None
         meaning = " ".join(said.value.split()) if isinstance(said, ast.Constant) and isinstance(said.value, str) else ""
         if isinstance(value, str) and "/" in value and not name.startswith("_"):
-            rows.append(f"| `{value}` | `{name}` | {meaning} |")
+            rows.append(f"| `{value}{'…' if value.endswith('/') else ''}` | `{name}` | {meaning} |")
     return HEAD + "\n".join(rows) + "\n"
