@@ -4,7 +4,7 @@
     .venv/bin/python benchmarks/plant_seeds.py --replay 1017                       # one seed, twice, with fewer and fewer faults
     .venv/bin/python benchmarks/plant_seeds.py --seeds 40 --defect claim-unseen    # how soon a defect put back in is found
 
-docs/plant-simulation.md says what is simulated, what has to hold, and what is not modelled.
+docs/explanation/plant-simulation.md says what is simulated, what has to hold, and what is not modelled.
 """
 
 import argparse

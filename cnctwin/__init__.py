@@ -1,8 +1,8 @@
 """cnctwin: a digital twin of CNC machines; in Python a store, run logs, simulation, diagnosis, optimisation and live rows.
 
 `import cnctwin` loads nothing but this file; each name below is loaded, with what it needs, when it is first asked for (PEP 562).
-The interface and what of it is stable: docs/python.md. All else in this package is the program: commands over services, over what
-is kept and what stands in; the ground is files, terminal and processes.
+The interface and what of it is stable: docs/reference/python.md. All else in this package is the program: commands
+over services, over what is kept and what stands in; the ground is files, terminal and processes.
 """
 
 TYPE_CHECKING = False  # as type checkers read it; `typing` would take longer to load than this file

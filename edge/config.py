@@ -23,7 +23,7 @@ from twin.vocabulary.signals import DERIVED, Kind
 
 BROKERS_MAX = 10
 _BY_ADDRESS = ("variables", "plc")
-_ENTRY = 'write name = { address = "…", unit = "…" }; docs/edges.md says how an address is written'
+_ENTRY = 'write name = { address = "…", unit = "…" }; docs/how-to/edges.md says how an address is written'
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
 

@@ -72,7 +72,7 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
             else unknown(f"[{name}]", name, (*_SECTIONS, *own))
         )
     if adapter is None or faults:
-        raise ConfigError(report(path, faults, "docs/edges.md"))
+        raise ConfigError(report(path, faults, "docs/how-to/edges.md"))
     config = EdgeConfig(source=source, path=path, **sections)
     for one in config.chosen:
         try:

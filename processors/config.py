@@ -33,7 +33,7 @@ class ProcessorConfig(BaseModel):
     unshown: ClassVar[frozenset[str]] = frozenset()
     """The keys below which a secret may stand: no error shows their values."""
     of_the_machine: ClassVar[Mapping[str, str]] = {}
-    """Keys of old tables that describe the machine → the section of its file (docs/machine.md) where they belong."""
+    """Keys of old tables that describe the machine → the section of its file (docs/reference/machine.md) where they belong."""
 
     tick_s: float = Field(default=1.0, ge=0.001, le=3600.0, description="a tick at each multiple of this")
     gap_s_max: float = Field(default=600.0, gt=0.0, le=86_400.0, description="a longer jump forwards is a hole")

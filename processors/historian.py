@@ -27,7 +27,7 @@ _DATA, _BIRTH = SampleKind.DATA, SampleKind.BIRTH
 
 
 class HistorianConfig(ProcessorConfig):
-    """The store, how long it keeps what (docs/store.md), and what is pinned."""
+    """The store, how long it keeps what (docs/reference/store.md), and what is pinned."""
 
     store: str = ""
     pin_before_s: float = Field(default=600.0, ge=0.0, le=86_400.0)

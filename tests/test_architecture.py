@@ -1,4 +1,4 @@
-"""docs/architecture.md is true: every path on it is there, and every room of the house is on it."""
+"""docs/explanation/architecture.md is true: every path on it is there, and every room of the house is on it."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
 PATH = re.compile(r"`((?:sparkplug|twin|edge|processors|cnctwin|tests|docs)/[\w./-]*(?:/|\.\w+))`")
 LINK = re.compile(r"\]\(([\w./-]+)\)")
 WAYS = ("The way of a sample", "The way of a recording", "The way of an alert")
@@ -23,7 +23,7 @@ def test_a_path_of_the_page_is_there(path: str) -> None:
 
 
 def test_links_of_the_page_lead_somewhere() -> None:
-    assert [link for link in LINK.findall(PAGE) if not (ROOT / "docs" / link).exists()] == []
+    assert [link for link in LINK.findall(PAGE) if not (ROOT / "docs" / "explanation" / link).exists()] == []
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -186,7 +186,7 @@ def test_every_room_says_what_it_is(package: str) -> None:
 
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 NO_FILES = {"processors/chip_load.py", "processors/chip_load.toml", "cnctwin/alerts/"}
-"""An example that docs/processors.md shows how to write, and a topic."""
+"""An example that docs/how-to/add-a-processor.md shows how to write, and a topic."""
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -336,7 +336,7 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
         faults = [fault | {"loc": _in_file(fault["loc"], raw)} for fault in _as_written(raw, error)]
-        raise MachineError(report(source, faults_of(faults, MachineFile), "docs/machine.md")) from None
+        raise MachineError(report(source, faults_of(faults, MachineFile), "docs/reference/machine.md")) from None
     except MachineError as error:
         raise MachineError(f"{source}: {error}") from None
 

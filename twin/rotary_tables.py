@@ -148,7 +148,7 @@ def _is_rotary(letter: str, axis: Mapping[str, Any]) -> bool:
     rotary = [key for key in keys if inside_name(key)[0] != key]
     linear = [key for key in keys if outside_name(key)[0] != key or key == "torque_constant_nm_per_a"]
     if "scale" in axis:
-        raise MachineError(f"axes.{letter}.scale is not known; docs/machine.md lists what is")
+        raise MachineError(f"axes.{letter}.scale is not known; docs/reference/machine.md lists what is")
     if rotary and linear:
         raise MachineError(f"axes.{letter} has {rotary[0]} of a rotary axis and {linear[0]} of a linear one; state one kind")
     return bool(rotary)

@@ -1,6 +1,6 @@
-"""The tables of docs/gap.md from the folder of a blind check, as Markdown, and its size curve as a picture.
+"""The tables of docs/explanation/gap-results.md from the folder of a blind check, as Markdown, and its size curve as a picture.
 
-    .venv/bin/python benchmarks/gap/publish.py FOLDER [--left-out FOLDER] [--picture docs/gap-size-curve.svg]
+    .venv/bin/python benchmarks/gap/publish.py FOLDER [--left-out FOLDER] [--picture docs/pictures/gap-size-curve.svg]
 
 FOLDER is that of `cnctwin gap check --keep`, finished or not. Baselines that ran in it (`benchmarks/gap/blind_check.py`) get a
 table beside the diagnosis, on the cases that all of them have done. --left-out: that of `benchmarks/gap/leave_one_out.py`.
@@ -88,7 +88,7 @@ def left_out(folder: Path) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description="The tables of docs/gap.md from the folder of a blind check.")
+    parser = argparse.ArgumentParser(description="The tables of docs/explanation/gap-results.md.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--left-out", type=Path)
     parser.add_argument("--picture", type=Path)

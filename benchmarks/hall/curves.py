@@ -1,4 +1,4 @@
-"""The curves of docs/fleet.md as an SVG: share of a core and age at 99 %, by the number of machines, before and now."""
+"""The curves of docs/explanation/fleet.md as an SVG: share of a core and age at 99 %, by machines, before and now."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""docs/fleet.md: the tables and curves of what was measured, filled in between its markers.
+"""docs/explanation/fleet.md: the tables and curves of what was measured, filled in between its markers.
 
     .venv/bin/python -m benchmarks.fleet --machines 4,20,50,100 --json many.json
     .venv/bin/python -m benchmarks.hall.page --add many.json           # into docs/figures/fleet.json, then page and curves anew
@@ -18,7 +18,7 @@ from benchmarks.hall import curves, holds
 from benchmarks.hall.trial import OWN
 
 FIGURES = OWN / "docs" / "figures" / "fleet.json"
-PAGE = OWN / "docs" / "fleet.md"
+PAGE = OWN / "docs" / "explanation" / "fleet.md"
 TREES = {"old": "before", "new": "now"}
 _BULKY = ("nodes", "looks")
 Trials = Sequence[dict[str, Any]]
@@ -229,7 +229,7 @@ def main() -> None:
     FIGURES.parent.mkdir(exist_ok=True)
     FIGURES.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n")
     PAGE.write_text(filled(PAGE.read_text(), figures))
-    curves.draw(figures.get("many", []), OWN / "docs" / "fleet.svg")
+    curves.draw(figures.get("many", []), OWN / "docs" / "pictures" / "fleet.svg")
 
 
 if __name__ == "__main__":

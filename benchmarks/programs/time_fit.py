@@ -52,7 +52,7 @@ START: dict[str, float] = {
 PARAMETERS = tuple(
     name for name in START if name not in {"corner_deviation_mm", "jerk_mm_s3", "rapid_jerk_mm_s3", "block_time_s"}
 )
-"""What is fitted unless told otherwise: the others gained nothing on the recordings at hand (docs/program-time.md)."""
+"""What is fitted unless told otherwise: the others gained nothing on these recordings (docs/explanation/program-time.md)."""
 SPINDLE_BASE_RPM = 3000.0
 """Spindle motors give constant power from a quarter or so of their top speed on. Assumed where `spindle_ramp` has no run-ups."""
 

@@ -32,7 +32,7 @@ NODE = NodeId("cnc", "hall")
 
 
 class DeduplicatingVictoria(VictoriaMetrics):
-    """As docs/influx.md says."""
+    """As docs/how-to/influx.md says."""
 
     deduplicates = True
 

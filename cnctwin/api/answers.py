@@ -132,7 +132,7 @@ class Events(Answer):
 
 
 class Figures(Answer):
-    """Production figures (docs/production.md): rows by machine, shift, part or program; a figure that is not known is null."""
+    """Production figures (docs/how-to/production.md): rows by machine, shift, part or program; unknown is null."""
 
     from_: T = Field(alias="from")
     to: T
@@ -145,7 +145,7 @@ class Figures(Answer):
 
 
 class Parts(Answer):
-    """As-built records (docs/part_record.schema.json), newest first."""
+    """As-built records (docs/reference/part_record.schema.json), newest first."""
 
     machine: MachineName
     source: Literal["store", "memory"]
@@ -153,7 +153,7 @@ class Parts(Answer):
 
 
 class Validation(Answer):
-    """The twin against ground truth; `t` is null where it was never judged (docs/validation.md)."""
+    """The twin against ground truth; `t` is null where it was never judged (docs/how-to/validation.md)."""
 
     machine: MachineName
     t: int | None
@@ -166,7 +166,7 @@ class Validation(Answer):
 
 
 class Replayed(Answer):
-    """The processors run again, beside what they published then (docs/replay.md); at most a hundred differences."""
+    """The processors run again, beside what they published then (docs/how-to/replay.md); at most a hundred differences."""
 
     machine: MachineName
     equal: bool

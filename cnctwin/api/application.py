@@ -18,6 +18,7 @@ from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.routes.alerts import alert_routes
 from cnctwin.api.routes.anomaly import anomaly_routes
+from cnctwin.api.routes.documentation import serve_documentation
 from cnctwin.api.routes.figures import figure_routes
 from cnctwin.api.routes.gap import gap_routes
 from cnctwin.api.routes.health import health_routes
@@ -89,6 +90,7 @@ def create_app(sources: Sources) -> FastAPI:
         app.include_router(sealed_routes(sources.envelope))
     app.mount(I3X, i3x_application(sources, subscriptions))
     serve_page(app)
+    serve_documentation(app)
     app.state.fan_out, app.state.sources = fan_out, sources
     app.state.subscriptions, app.state.tell = subscriptions, tell
     return app

@@ -23,7 +23,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for a program 
 Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 Config = Annotated[Path | None, typer.Option(help="TOML file with a table for each processor", show_default=False)]
 Dask = Annotated[
-    str | None, typer.Option(help="Spread over a Dask cluster: tcp://host:8786 or tls://… (docs/jobs.md)", show_default=False)
+    str | None,
+    typer.Option(help="Spread over a Dask cluster: tcp://host:8786 or tls://… (docs/how-to/jobs.md)", show_default=False),
 ]
 Device = Annotated[str | None, typer.Option(help="Which device of the device model, where there are several", show_default=False)]
 Devices = Annotated[

@@ -19,7 +19,7 @@ SHORT_BLOCK_S = 1.0
 AXIS_SITES = frozenset({Site.REFERENCE, Site.CONTROLLER, Site.DRIVE_FORCE, Site.FRICTION, Site.MECHANICS, Site.CLOCK})
 HEAT = ("spindle_temp_c", "spindle_rpm", "spindle_load_pct", "ambient_temp_c")
 ENGAGEMENT = ("axial_depth_mm", "entry_angle_rad", "exit_angle_rad", "spindle_angle_rad")
-RECORD = "record at the servo period (docs/gap.md)"
+RECORD = "record at the servo period (docs/how-to/recording.md)"
 
 
 @dataclass(frozen=True, slots=True)

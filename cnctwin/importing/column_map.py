@@ -121,7 +121,7 @@ class ColumnMap(_Table):
             column = run_column(name)
             if column is None:
                 raise ValueError(
-                    f"columns.{name} is no column of a run log and no canonical signal; docs/recording.md lists them"
+                    f"columns.{name} is no column of a run log and no canonical signal; docs/how-to/recording.md lists them"
                 )
             into = unit_of(column)
             if options.unit is not None and conversion(options.unit, into) is None:
@@ -149,4 +149,4 @@ def read_map(path: Path) -> ColumnMap:
         raise UsageError(f"{path}: is no TOML: {error}") from None
     except ValidationError as error:
         faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], ColumnMap)
-        raise UsageError(report(path, faults, "docs/recording.md")) from None
+        raise UsageError(report(path, faults, "docs/how-to/recording.md")) from None

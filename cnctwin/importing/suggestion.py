@@ -99,7 +99,7 @@ def _first_values(content: Content, name: str) -> pa.Array:
 def draft(suggested: Suggestion, contents: Sequence[Content], names: str, dialect: str) -> str:
     """Return a columns.toml with the columns there are, for a person to check."""
     lines = [
-        f"# A map of {names} ({dialect}) for `cnctwin import --map`. docs/recording.md explains it.",
+        f"# A map of {names} ({dialect}) for `cnctwin import --map`. docs/how-to/recording.md explains it.",
         "# Columns of the file:",
     ]
     seen = {column.name: column for content in contents for column in content.columns}

@@ -70,7 +70,7 @@ class Diagnosis:
 
 
 def diagnose(case: str | Path, *, progress: Callable[[str], None] | None = None) -> Diagnosis:
-    """Diagnose the case in a folder (docs/cases.md).
+    """Diagnose the case in a folder (docs/how-to/cases.md).
 
     progress: is told what is being done, from whichever thread does it
 

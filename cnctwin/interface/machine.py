@@ -1,4 +1,4 @@
-"""A machine as its machine.toml describes it (docs/machine.md)."""
+"""A machine as its machine.toml describes it (docs/reference/machine.md)."""
 
 from pathlib import Path
 

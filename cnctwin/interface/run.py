@@ -24,7 +24,7 @@ Columns = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """One recording; names and units of its columns are those of the run log's file (docs/recording.md).
+    """One recording; names and units of its columns are those of the run log's file (docs/how-to/recording.md).
 
     >>> run = Run.of({"t_s": [0.0, 0.1, 0.2], "spindle_load_pct": [12.0, None, 14.0], "exec_state": ["ACTIVE", None, None]})
     >>> run.columns, len(run), run.seconds

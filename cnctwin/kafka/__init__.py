@@ -1,1 +1,1 @@
-"""Past one machine: Kafka between the broker and the processors (docs/kafka.md). Needs the extra `kafka`."""
+"""Past one machine: Kafka between the broker and the processors (docs/how-to/kafka.md). Needs the extra `kafka`."""

@@ -23,7 +23,7 @@ Conf = dict[str, Any]
 
 
 class KafkaSettings(BaseModel):
-    """See the module and docs/kafka.md.
+    """See the module and docs/how-to/kafka.md.
 
     partitions: of each topic; machines stay where they are only while it does not change
     retention_hours: of readings, cells and results
@@ -110,4 +110,4 @@ def settings_of(bootstrap: str | None, path: Path | None, environment: Mapping[s
         from twin.vocabulary.faults import faults_of, report  # noqa: PLC0415  only where something is wrong
 
         faults = faults_of([dict(fault) for fault in error.errors(include_url=False)], KafkaSettings)
-        raise ConfigurationError(report(path or "kafka", faults, "docs/kafka.md")) from None
+        raise ConfigurationError(report(path or "kafka", faults, "docs/how-to/kafka.md")) from None

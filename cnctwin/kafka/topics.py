@@ -125,7 +125,7 @@ def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[st
     missing = [name for name in wanted if name not in present]
     if missing and not settings.create_topics:
         raise ConfigurationError(
-            f"kafka: the topics {', '.join(missing)} are missing; make them (docs/kafka.md), or set create_topics"
+            f"kafka: the topics {', '.join(missing)} are missing; make them (docs/how-to/kafka.md), or set create_topics"
         )
     made: dict[str, Future[None]] = {}
     if missing:

@@ -38,7 +38,7 @@ class Promote(StrEnum):
 
 
 class LoopConfig(BaseModel):
-    """See docs/loop.md, which has a line on each. Times are those of the machine's own clock."""
+    """See docs/how-to/loop.md, which has a line on each. Times are those of the machine's own clock."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 

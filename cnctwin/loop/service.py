@@ -63,7 +63,9 @@ class LoopService:
         self, machines: Path, broker: BrokerAddress, configuration: LoopConfiguration, places: Places, group: str = "cnc"
     ) -> None:
         if not machines.is_dir():
-            raise UsageError(f"{machines}: is no folder of descriptions; make it, with <machine>.toml in it (docs/loop.md)")
+            raise UsageError(
+                f"{machines}: is no folder of descriptions; make it, with <machine>.toml in it (docs/how-to/loop.md)"
+            )
         self._folder, self._configuration, self._group = machines, configuration, group
         self._lock = _locked(machines)
         self._host = HostApplication(

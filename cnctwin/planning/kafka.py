@@ -1,4 +1,4 @@
-"""A plan past one computer: bridges, runners, Kafka and MQTT brokers of a fleet whose folds run on Kafka (docs/kafka.md).
+"""A plan past one computer: bridges, runners, Kafka and MQTT brokers of a fleet whose folds run on Kafka (docs/how-to/kafka.md).
 
 Work is messages of machines, results of processors, and values of the mirror a second, each with its cost in every part.
 Machines are split into groups where one Mosquitto, which computes on one core, or one bridge with all results of one processor
@@ -187,7 +187,7 @@ def _with_needs(made: KafkaPlan, fleet: Fleet, machines: int, fold_us: float, me
             Need(
                 "historians",
                 f"{_times(made.historians, made.groups)}, a store each; {_size(a_day)} a day together",
-                "the historian's cost on MQTT and the bytes of docs/store.md; not measured on Kafka",
+                "the historian's cost on MQTT and the bytes of docs/reference/store.md; not measured on Kafka",
             )
         )
     found.append(Need("pages", f"{made.groups}, one a group", "a page reads one broker; not measured with so many machines"))

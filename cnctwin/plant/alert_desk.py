@@ -1,6 +1,6 @@
 """The alerts desk: the alerts processor's state as it publishes it on the broker, and commands to it.
 
-The topics are those of `processors/alerts` (docs/alerts.md).
+The topics are those of `processors/alerts` (docs/how-to/alerts.md).
 """
 
 import json

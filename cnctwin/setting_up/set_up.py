@@ -31,16 +31,16 @@ T = TypeVar("T")
 NONE, PRIVATE, KEEP = "none", "private", "keep"
 USUAL_CLASS = "vmc-40"
 PROCESSORS = """\
-# How the processors of this plant run: a table for each. What does not stand here has its default (docs/processors.md).
+# How the processors of this plant run: a table for each. What does not stand here has its default (docs/reference/processors.md).
 
 [historian]
 raw_days = 365.0
 
 [alerts]
-# Receivers of notifications stand below, one table for each (docs/alerts.md); their secrets in secrets/plant.env.
+# Receivers of notifications stand below, one table for each (docs/how-to/alerts.md); their secrets in secrets/plant.env.
 
 [loop]
-# A gap that grows is diagnosed by itself; its answer waits until a person promotes it (docs/loop.md).
+# A gap that grows is diagnosed by itself; its answer waits until a person promotes it (docs/how-to/loop.md).
 diagnose = "by_itself"
 promote = "by_hand"
 """

@@ -48,4 +48,4 @@ def budgets_of(table: dict[str, Any], source: str) -> Budgets:
     try:
         return Budgets.model_validate(table)
     except ValidationError as error:
-        raise UsageError(report(source, table_faults(Budgets, error, TABLE), "docs/validation.md")) from None
+        raise UsageError(report(source, table_faults(Budgets, error, TABLE), "docs/how-to/validation.md")) from None

@@ -8,7 +8,8 @@ offset is the median of the last windows.
 
 A control that is polled shows a change late, by half a poll on average: with `poll_s` known the change is spread over the poll
 before, which takes that out; with 0 it is the sample-and-hold of the plain method. Either way errors reach half a second
-(docs/clocks.md has the table), and that is the least that the bound claims: good for an alarm at one second, not for 100 ms.
+(docs/explanation/clocks.md has the table), and that is the least that the bound claims: good for an alarm at one second, not for
+100 ms.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The as-built record of a part: one JSON text when a program run has ended, for an MES or a PLM (docs/part_record.schema.json).
+"""The as-built record of a part, JSON at the end of a program run for an MES or PLM (docs/reference/part_record.schema.json).
 
 Each figure says where it comes from; what was missing stands in `reasons`, and `complete` is false where it concerns the run as a
 whole: its beginning or its end was not seen, or the control was not heard for a share of it.

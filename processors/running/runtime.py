@@ -118,7 +118,7 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> list[Co
         except ConfigurationError as error:
             faults += str(error).split("\n")
     if faults:
-        raise ConfigurationError(report(config_path, faults, "docs/processors.md"))
+        raise ConfigurationError(report(config_path, faults, "docs/reference/processors.md"))
     for _, configuration in found:
         for line in configuration.belongs_elsewhere():
             _log.warning("%s: %s", config_path, line)

@@ -54,7 +54,7 @@ class Plant:
         self._process: subprocess.Popen[bytes] | None = None
 
     def build(self) -> None:
-        """Certificates, users and configuration, as docs/security.md says."""
+        """Certificates, users and configuration, as docs/how-to/security.md says."""
         certificates("init", self.authority)
         certificates("server", self.authority, "broker", "--host", "localhost", "--host", "127.0.0.1")
         for name in (*BY_CERTIFICATE, "processors"):

@@ -105,12 +105,12 @@ def test_an_address_that_is_none_is_refused_in_one_line(adapter: Adapter, is_plc
 def test_its_sample_its_page_and_its_code_lead_to_each_other(adapter: Adapter) -> None:
     declaration = f"{modules()[adapter.name].replace('.', '/')}.py"
     sample, shared = adapter.sample_config.relative_to(ROOT).as_posix(), SHARED.relative_to(ROOT).as_posix()
-    page = f"docs/edge-{adapter.name.replace('_', '-')}.md"
+    page = f"docs/how-to/edge-{adapter.name.replace('_', '-')}.md"
     for file, others in (
         (sample, (page, declaration, shared)),
         (declaration, (page, adapter.sample_config.name, shared)),
-        (page, (f"(../{sample})", f"(../{declaration})", f"(../{shared})")),
-        ("docs/edges.md", (f"({page.removeprefix('docs/')})", f"(../{sample})", f"(../{shared})")),
+        (page, (f"(../../{sample})", f"(../../{declaration})", f"(../../{shared})")),
+        ("docs/how-to/edges.md", (f"({Path(page).name})", f"(../../{sample})", f"(../../{shared})")),
     ):
         text = (ROOT / file).read_text(encoding="utf-8")
         assert [other for other in others if other not in text] == [], file

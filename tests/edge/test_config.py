@@ -38,7 +38,7 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
     ("text", "expected"),
     [
         ("[machine]\nname = 'a/b'", "vmc.toml: machine.name = 'a/b': does not match the pattern ^[^/+#]+$"),
-        ("[machine]\nnam = 'a'", "vmc.toml: machine.nam is not known; did you mean name? See docs/edges.md"),
+        ("[machine]\nnam = 'a'", "vmc.toml: machine.nam is not known; did you mean name? See docs/how-to/edges.md"),
         ("[machine]\nadapter = 'fagor'", "vmc.toml: machine.adapter = 'fagor' is not known; known are focas, "),
         ("[machine]\nlost_after_s = 'soon'", "vmc.toml: machine.lost_after_s = 'soon': is no number; write one without quotes"),
         ("[mtconnect]\nurl = 'agent:5000'", "vmc.toml: mtconnect.url = 'agent:5000': is no http:// or https:// address"),
@@ -85,7 +85,7 @@ def test_all_mistakes_of_a_file_are_told_at_once() -> None:
     with pytest.raises(ConfigError) as caught:
         parse("[machine]\nname = 'a'\n[mtconnect]\ncount = 0\nur = 'x'\n[signals.feed_mm_min]\ndeadbnd = 1\n[repot]\n", FILE)
     assert str(caught.value).split("\n  ") == [
-        "vmc.toml: 4 faults; see docs/edges.md",
+        "vmc.toml: 4 faults; see docs/how-to/edges.md",
         "signals.feed_mm_min.deadbnd is not known; did you mean deadband?",
         "mtconnect.ur is not known; did you mean url?",
         "mtconnect.count = 0: must be 1 or more",

@@ -1,4 +1,4 @@
-"""The consumer that docs/kafka.md prints runs as it stands."""
+"""The consumer that docs/how-to/kafka.md prints runs as it stands."""
 
 import re
 import subprocess
@@ -14,7 +14,7 @@ FOUND = re.compile(r"<!-- kafka consumer -->\n```python\n(.*?)```", re.DOTALL)
 
 
 def test_the_consumer_of_the_page_prints_what_a_machine_says(kafka: KafkaServer, tmp_path: Path) -> None:
-    found = FOUND.search((PROJECT / "docs" / "kafka.md").read_text(encoding="utf-8"))
+    found = FOUND.search((PROJECT / "docs" / "how-to" / "kafka.md").read_text(encoding="utf-8"))
     assert found is not None
     program = tmp_path / "consumer.py"
     program.write_text(found[1].replace("kafka:9092", kafka.bootstrap).replace("cnctwin.cnc.", "cnctwin.docs."))

@@ -1,4 +1,4 @@
-"""A slice of seeds: whole plants with the faults that each seed draws (docs/plant-simulation.md; the rest is a benchmark)."""
+"""A slice of seeds: whole plants with the faults that each draws (docs/explanation/plant-simulation.md)."""
 
 import os
 import subprocess

@@ -85,12 +85,12 @@ def _drifted(given: Mapping[str, Any], defaults: Mapping[str, Any], text: str, w
 def test_sample_page_and_code_lead_to_each_other(processor: AnyProcessor) -> None:
     path = sample_configuration(processor)
     opening = "\n".join(path.read_text(encoding="utf-8").splitlines()[:3])
-    pages = re.findall(r"^# Page: (docs/[\w-]+\.md)$", opening, re.MULTILINE)
-    assert len(pages) == 1, f"{path.relative_to(ROOT)}: one of its first three lines is `# Page: docs/<page>.md`"
+    pages = re.findall(r"^# Page: (docs/[\w/-]+\.md)$", opening, re.MULTILINE)
+    assert len(pages) == 1, f"{path.relative_to(ROOT)}: one of its first three lines is `# Page: docs/<kind>/<page>.md`"
     (page,) = pages
     links = re.findall(r"\]\(([^)]+)\)", (ROOT / page).read_text(encoding="utf-8"))
-    code = f"../{modules()[processor.name].replace('.', '/')}.py"
-    assert {code, f"../{path.relative_to(ROOT)}"} <= set(links)
+    code = f"../../{modules()[processor.name].replace('.', '/')}.py"
+    assert {code, f"../../{path.relative_to(ROOT)}"} <= set(links)
 
 
 @every_processor

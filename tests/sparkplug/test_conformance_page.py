@@ -31,7 +31,7 @@ def test_the_list_has_the_299_statements() -> None:
 
 def _tree(tmp_path: Path, test: str) -> Path:
     """A small project with one test; hands back its script."""
-    for folder in ("scripts", "docs", "tests/sparkplug"):
+    for folder in ("scripts", "docs/reference", "tests/sparkplug"):
         (tmp_path / folder).mkdir(parents=True)
     script = tmp_path / "scripts" / "conformance"
     script.write_text(SCRIPT.read_text())
@@ -52,13 +52,13 @@ def test_a_page_that_does_not_fit_the_tests_is_an_error(tmp_path: Path) -> None:
     assert _check(script=script).returncode == 1
     subprocess.run([sys.executable, str(script)], check=True, capture_output=True, timeout=60)
     assert _check(script=script).returncode == 0
-    assert "1 of the 2 statements" in (tmp_path / "docs" / "conformance.md").read_text()
+    assert "1 of the 2 statements" in (tmp_path / "docs" / "reference" / "conformance.md").read_text()
 
 
 def test_a_statement_whose_test_is_expected_to_fail_is_not_held(tmp_path: Path) -> None:
     test = '@pytest.mark.xfail(strict=True, reason="the reason")\n@pytest.mark.tck("tck-id-a")\ndef test_it(): pass\n'
     script = _tree(tmp_path, test)
     subprocess.run([sys.executable, str(script)], check=True, capture_output=True, timeout=60)
-    page = (tmp_path / "docs" / "conformance.md").read_text()
+    page = (tmp_path / "docs" / "reference" / "conformance.md").read_text()
     assert "- `tck-id-a` (edge): the reason" in page
     assert "- `tck-id-b` (host): no test names it" in page

@@ -82,14 +82,14 @@ def test_all_that_is_wrong_is_told_at_once_with_the_nearest_right_name() -> None
     with pytest.raises(MachineError) as error:
         machine_from_toml(text + "\n[spindel]\n", "vmc.toml")
     head, *lines = str(error.value).split("\n  ")
-    assert head == f"vmc.toml: {len(lines)} faults; see docs/machine.md"
+    assert head == f"vmc.toml: {len(lines)} faults; see docs/reference/machine.md"
     assert lines[:2] == ["axes.x.mass_k is not known; did you mean mass_kg?", "spindel is not known; did you mean spindle?"]
     assert {"axes.x.mass_kg is missing"} < set(lines)
     assert any(line.startswith("axes.x.friction.static_n") for line in lines)
 
 
 def test_the_example_of_the_page_is_a_machine() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "machine.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "machine.md").read_text(encoding="utf-8")
     machine = machine_from_toml(page.split("```toml\n")[1].split("```")[0])
     check_effects(machine)
     assert set(type(machine).model_fields) == machine.model_fields_set, "a section is missing in the example"

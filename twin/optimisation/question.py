@@ -127,7 +127,7 @@ def _made(text: str) -> tuple[Problem, tuple[Impossible, ...], str]:
         limits = limits.model_copy(update={"force_n": limits.force_n / question.margin})
     if question.objective is not Objective.TIME and machine.cost is None:
         raise OptimisationError(
-            f"no [cost]: --objective {question.objective} needs what a second and a tool cost (docs/optimise.md)"
+            f"no [cost]: --objective {question.objective} needs what a second and a tool cost (docs/how-to/optimise.md)"
         )
     read = _read(json.dumps([question.program_text, question.machine_toml, question.planned, question.left_alone]))
     economy = Economy.of(machine.cost) if machine.cost is not None else None

@@ -7,7 +7,7 @@ Two questions are answered without walking over the chart. The limit at a speed:
 a whole number of turns, the one with the largest Re λ. The speeds at a depth: where Re λ ≥ 1 / (K_t b), ω runs over ranges; each
 with each k covers one interval of T that is unstable, and what they leave is stable. No pocket is too narrow to be found.
 
-What zero order does not know: see docs/chatter.md.
+What zero order does not know: see docs/explanation/chatter.md.
 """
 
 import math

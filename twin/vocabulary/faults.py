@@ -80,10 +80,10 @@ def unknown(what: str, name: str, known: Collection[str]) -> str:
 def report(source: object, faults: Sequence[str], see: str = "") -> str:
     """Return what an error says of a file: its fault, or all of them, each on a line of its own.
 
-    see: where what is right is described, as `docs/machine.md`
+    see: where what is right is described, as `docs/reference/machine.md`
 
-    >>> print(report("vmc.toml", ["a is missing", "b is missing"], "docs/machine.md"))
-    vmc.toml: 2 faults; see docs/machine.md
+    >>> print(report("vmc.toml", ["a is missing", "b is missing"], "docs/reference/machine.md"))
+    vmc.toml: 2 faults; see docs/reference/machine.md
       a is missing
       b is missing
     >>> report("vmc.toml", ["a is missing"])

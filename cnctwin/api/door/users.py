@@ -51,14 +51,14 @@ def read_users(path: Path) -> tuple[User, ...]:
         told = tomllib.loads(private_text(path, "--users"))
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line \d+", str(error))
-        raise UsageError(f"--users {path}: {place[0] if place else 'the end'} is no TOML; see docs/api.md") from None
+        raise UsageError(f"--users {path}: {place[0] if place else 'the end'} is no TOML; see docs/reference/api.md") from None
     if len(told) > USERS_MAX:
         raise UsageError(f"--users {path} has {len(told)} users; {USERS_MAX} are the limit")
     try:
         entries = _Entries.model_validate(told).root
     except ValidationError as error:
         faults = [dict(fault) for fault in error.errors(include_input=False, include_url=False)]
-        raise UsageError(report(f"--users {path}", faults_of(faults, _Entries, shown=None), "docs/api.md")) from None
+        raise UsageError(report(f"--users {path}", faults_of(faults, _Entries, shown=None), "docs/reference/api.md")) from None
     users = tuple(User(name, Role[one.role.upper()], one.token) for name, one in entries.items())
     for user in users:
         if not _NAME.fullmatch(user.name):

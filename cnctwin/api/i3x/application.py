@@ -25,7 +25,7 @@ def i3x_application(sources: Sources, subscriptions: Subscriptions) -> FastAPI:
     """The application. `Guard` stands before it, as before all routes."""
     app = FastAPI(
         title="cnctwin over i3X",
-        description="CESMII's common interface for industrial information, the reading part (docs/i3x.md).",
+        description="CESMII's common interface for industrial information, the reading part (docs/reference/i3x.md).",
         version=SPEC_VERSION,
         docs_url=None,
         redoc_url=None,

@@ -23,7 +23,7 @@ class LoopAnswer(Answer):
 
 
 class LoopDocument(Answer):
-    """The loop of a machine as it stands (docs/loop.md); times are ms since 1970, UTC, gaps in floors."""
+    """The loop of a machine as it stands (docs/how-to/loop.md); times are ms since 1970, UTC, gaps in floors."""
 
     machine: str = Field(examples=["vmc"])
     step: str | None = Field(description="watching, composing, diagnosing, shadow, promoted or refused", examples=["shadow"])

@@ -65,7 +65,7 @@ class Outcome(Answer):
 
 
 class Alerts(Answer):
-    """The state of the alerts processor as it publishes it (docs/alerts.md), and whether that can be relied on."""
+    """The state of the alerts processor as it publishes it (docs/how-to/alerts.md), and whether that can be relied on."""
 
     now: int
     available: bool

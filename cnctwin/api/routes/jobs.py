@@ -35,7 +35,7 @@ JobId = Annotated[str, Path(description="As GET /jobs has it", max_length=64, ex
 
 
 class JobRequest(BaseModel):
-    """A request for a job: its kind, and the parameters of that kind (docs/jobs.md). Files lie below the consumer's folder."""
+    """A request for a job: its kind and its parameters (docs/how-to/jobs.md). Files lie below the consumer's folder."""
 
     model_config = ConfigDict(
         extra="allow",

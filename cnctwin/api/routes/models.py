@@ -1,4 +1,4 @@
-"""GET /models, POST /models/{kind}/{machine}/promote: the registry of models (docs/anomaly.md), and which version counts."""
+"""GET /models, POST /models/{kind}/{machine}/promote: the models (docs/explanation/anomaly.md), and which version counts."""
 
 import time
 from pathlib import Path as FilePath

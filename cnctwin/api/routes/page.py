@@ -71,15 +71,15 @@ def page_routes(access: Access, failures: Failures) -> APIRouter:
 
 
 def serve_page(app: FastAPI) -> None:
-    """The page at /, its files under /page/, the list of routes at /docs."""
+    """The page at /, its files under /page/, the list of routes at /routes."""
     files = PageFiles(directory=WEB, check_dir=False)
 
     @app.get("/", include_in_schema=False)
     async def index(request: Request) -> Response:
         return await files.get_response("index.html", request.scope)
 
-    @app.get("/docs", include_in_schema=False)
-    async def docs() -> HTMLResponse:
+    @app.get("/routes", include_in_schema=False)
+    async def routes() -> HTMLResponse:
         return HTMLResponse(routes_page(app.openapi()))
 
     app.mount("/page", files, name="page")

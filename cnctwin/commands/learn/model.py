@@ -64,7 +64,7 @@ def show(kind: Kind, machine: Machine, version: Version, models: Models = None, 
 def add(
     kind: Kind,
     machine: Machine,
-    folder: Annotated[Path, typer.Argument(help="What a cnctwin train command wrote")],
+    folder: Annotated[Path, typer.Argument(help="What `cnctwin train` wrote")],
     models: Models = None,
 ) -> None:
     """Put a trained model into the registry. The first one of a machine counts at once, the next have to win or be promoted."""

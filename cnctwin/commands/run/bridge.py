@@ -28,10 +28,11 @@ def bridge(
     state_dir: StateDir = None,
     machines: Machines = None,
     keep_session: Annotated[
-        float, typer.Option(help="Hours for which the broker keeps what it cannot deliver; 0 = none (docs/kafka.md)", min=0.0)
+        float,
+        typer.Option(help="Hours for which the broker keeps what it cannot deliver; 0 = none (docs/how-to/kafka.md)", min=0.0),
     ] = 0.0,
 ) -> None:
-    """Write what machines send to Kafka, and publish what processors on Kafka compute (docs/kafka.md)."""
+    """Write what machines send to Kafka, and publish what processors on Kafka compute (docs/how-to/kafka.md)."""
     from cnctwin.kafka.settings import settings_of
     from cnctwin.processes.extras import needed_by
 

@@ -113,7 +113,7 @@ def _show_kafka(beyond: "KafkaPlan", console: Console) -> None:
     from cnctwin.planning.measured import ON_KAFKA
 
     console.print(
-        f"\nOn Kafka (docs/kafka.md), by what was measured {ON_KAFKA.date} on {ON_KAFKA.computer}; ~ is an extrapolation:",
+        f"\nOn Kafka (docs/how-to/kafka.md), by what was measured {ON_KAFKA.date} on {ON_KAFKA.computer}; ~ is an extrapolation:",
         soft_wrap=True,
         highlight=False,
     )

@@ -25,7 +25,9 @@ def serve(
     host: Annotated[str, typer.Option(help="Address to listen on; another than loopback needs a token or a proxy")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 = a free one", min=0, max=65535)] = 8080,
     token_file: Annotated[Path | None, typer.Option(help="File of mode 600 with the token; else $CNCTWIN_PAGE_TOKEN")] = None,
-    users: Annotated[Path | None, typer.Option(help="File of mode 600 with users, their roles and tokens (docs/api.md)")] = None,
+    users: Annotated[
+        Path | None, typer.Option(help="File of mode 600 with users, their roles and tokens (docs/reference/api.md)")
+    ] = None,
     audit: Annotated[
         Path | None,
         typer.Option(help="The record of who did what; else audit/page.jsonl in the state folder", show_default=False),

@@ -174,7 +174,7 @@ def run_loop(
 
     folder = machines_folder(machines, config)
     if folder is None:
-        raise UsageError("no folder of descriptions is here; give --machines DIR or $CNCTWIN_MACHINES (docs/loop.md)")
+        raise UsageError("no folder of descriptions is here; give --machines DIR or $CNCTWIN_MACHINES (docs/how-to/loop.md)")
     files = jobs_files or state_dir() / "cases"
     files.mkdir(parents=True, exist_ok=True)
     places = Places(store or default_place(), files, jobs or state_dir() / "jobs", diagnoses or folder / "diagnoses")
@@ -193,7 +193,7 @@ def _folder(machine: str, given: Path | None) -> "MachineFolder":
     folder = machines_folder(given)
     if folder is None or not folder.is_dir():
         where = "no folder of descriptions is here" if folder is None else f"{folder}: is no folder"
-        raise UsageError(f"{where}; give --machines DIR or ${VARIABLE}, with {machine}.toml in it (docs/loop.md)")
+        raise UsageError(f"{where}; give --machines DIR or ${VARIABLE}, with {machine}.toml in it (docs/how-to/loop.md)")
     own = MachineFolder(folder, machine)
     if machine not in (known := described(folder)):
         raise UsageError(f"{folder}: nobody has described {machine!r}; there are {', '.join(known) or 'no machines'}")

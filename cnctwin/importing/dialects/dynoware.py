@@ -1,7 +1,7 @@
 """Text export of DynoWare (Kistler dynamometers): lines about the measurement, names, units, then rows.
 
 `Sampling rate [Hz]:,10000` stands among the lines above; a file whose first column is no time has its rows at that rate. By the
-description in docs/recording.md; no public specification was found.
+description in docs/how-to/recording.md; no public specification was found.
 """
 
 import re

@@ -1,6 +1,6 @@
 """A plan for a year of these machines on this disk, and what to keep: from what a store has seen, or from figures.
 
-Bytes a sample are measured (docs/store.md): of slow signals with few decimals, of vibration in blocks, of features.
+Bytes a sample are measured (docs/reference/store.md): of slow signals with few decimals, of vibration in blocks, of features.
 """
 
 import math

@@ -3,7 +3,7 @@
 Two backends behind one interface (`edge.controls.focas.calls`): the user's own library, and the Ethernet protocol itself, which
 is experimental. Both only read.
 
-Documentation: docs/edge-focas.md. Every key of the configuration: focas.toml beside this file, edge/edge.toml.
+Documentation: docs/how-to/edge-focas.md. Every key of the configuration: focas.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -8,7 +8,7 @@ from edge.errors import ConnectionLostError
 from edge.sample import SampleSet
 from edge.sweep import Sweep
 
-EXPERIMENTAL = "FANUC has not published this protocol: put each value beside the control's screen (docs/edge-focas.md)"
+EXPERIMENTAL = "FANUC has not published this protocol: put each value beside the control's screen (docs/how-to/edge-focas.md)"
 
 
 def describe(config: Config) -> list[Row]:
@@ -36,5 +36,7 @@ def look(config: Config) -> tuple[Sweep, SampleSet]:
     connection = FocasConnection(config, wait=lambda _: None)
     raw = connection.once()
     if raw is None:
-        raise ConnectionLostError(f"{connection.last_error}; {_way_out(config, connection.last_error)} (docs/edge-focas.md)")
+        raise ConnectionLostError(
+            f"{connection.last_error}; {_way_out(config, connection.last_error)} (docs/how-to/edge-focas.md)"
+        )
     return Sweep.decode(raw), parse(config, start(config), raw)[1]

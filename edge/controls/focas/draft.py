@@ -16,7 +16,7 @@ from sparkplug.shown_address import shown_address
 
 PORT = 8193
 CHOSEN_LINES = (
-    "# What this machine keeps in variables and in its PMC, under names of your own (docs/edge-focas.md):",
+    "# What this machine keeps in variables and in its PMC, under names of your own (docs/how-to/edge-focas.md):",
     "# [variables]",
     '# part_width = { address = "#500", unit = "mm" }',
     "# [plc]",

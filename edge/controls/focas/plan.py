@@ -100,8 +100,8 @@ class Subject(NamedTuple):
 _SUBJECT = {"modal.T": "tool", "modal.H": "length_offset", "modal.D": "radius_offset", "program.number": "program"}
 NO_OFFSET = "no offset is in force: {} 0"
 UNREAD = "unread."  # before the signal, in the key of a fact that this configuration cannot ask for
-BY_LIBRARY = 'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/edge-focas.md)'
-BY_UNIT = 'FOCAS does not tell the unit: set focas.tool_life_unit = "minutes" or "uses" (docs/edge-focas.md)'
+BY_LIBRARY = 'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/how-to/edge-focas.md)'
+BY_UNIT = 'FOCAS does not tell the unit: set focas.tool_life_unit = "minutes" or "uses" (docs/how-to/edge-focas.md)'
 _LIFE_SIGNALS = ("tool_life_used_min", "tool_life_limit_min", "tool_life_used_count", "tool_life_limit_count")
 
 

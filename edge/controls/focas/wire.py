@@ -8,7 +8,7 @@
     value    i32 mantissa | u16 base | i16 exponent: mantissa / base^exponent; FFFF as exponent is no value
 
 FANUC has not published it. The sources are the notes and captures of pyfanuc (https://github.com/diohpix/pyfanuc, Unlicense) and
-captures of others; what is known from captures and what is not is said in docs/edge-focas.md.
+captures of others; what is known from captures and what is not is said in docs/how-to/edge-focas.md.
 """
 
 import struct

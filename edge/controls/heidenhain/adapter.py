@@ -4,7 +4,7 @@
 writes; `cursor` makes samples of a look, with the tool from the program's text (`klartext`, `tool_flow`) where the control does
 not tell it.
 
-Documentation: docs/edge-heidenhain.md. Every key of the configuration: heidenhain.toml beside this file, edge/edge.toml.
+Documentation: docs/how-to/edge-heidenhain.md. Every key of the configuration: heidenhain.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -35,7 +35,7 @@ TEXTS_MAX = 2
 RUNNING = 0
 GOES_ON = (RUNNING, 1, 4)  # running, stopped or interrupted: the program is at this block
 STARTED_INSIDE = "the program was started after its TOOL CALL, in block"
-NO_SOURCE = "no telegram of LSV2 tells it; name its PLC address in [heidenhain.plc]"  # how: docs/edge-heidenhain.md
+NO_SOURCE = "no telegram of LSV2 tells it; name its PLC address in [heidenhain.plc]"  # how: docs/how-to/edge-heidenhain.md
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ def draft(url: str, device: str = "") -> str:
         "",
         "[heidenhain]",
         f'url = "{url}"',
-        f"# tool_table = '{_tool_table(control)}'  # length, radius, wear and age of the tool (docs/edge-heidenhain.md)",
+        f"# tool_table = '{_tool_table(control)}'  # length, radius, wear and age of the tool (docs/how-to/edge-heidenhain.md)",
         *_clock_lines(sweep),
         "",
         "# Told by the control:",
@@ -51,7 +51,7 @@ def draft(url: str, device: str = "") -> str:
     lines += [f"#   {offer.signal}: {_one_line(last[offer.signal].reason or '')[:120]}" for offer in silent] or ["#   none"]
     lines += [
         "",
-        "# The addresses are the machine builder's: ask for his PLC lists, or see them on the control (docs/edge-heidenhain.md).",
+        "# The addresses are the machine builder's: ask for the PLC lists (docs/how-to/edge-heidenhain.md).",
         "# [heidenhain.plc]",
         '# tool_number = "W1000"',
         '# tool_change = "M4000"       # 1 while a tool change is in progress',

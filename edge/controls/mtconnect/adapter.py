@@ -3,7 +3,7 @@
 `cursor` parses the documents and decides what to ask for next, `connection` asks, `mapping` and `names.toml` say which data item
 is which signal.
 
-Documentation: docs/edge-mtconnect.md. Every key of the configuration: mtconnect.toml beside this file, edge/edge.toml.
+Documentation: docs/how-to/edge-mtconnect.md. Every key of the configuration: mtconnect.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -5,7 +5,7 @@ missing, `cursor` parses. Alarms come as events: `event_session` hears them, `al
 the list. `tool_reader` and `life_reader` ask for what belongs to the tool in the spindle. The library asyncua is an extra: only a
 connection imports it.
 
-Documentation: docs/edge-opcua.md. Every key of the configuration: opcua.toml beside this file, edge/edge.toml.
+Documentation: docs/how-to/edge-opcua.md. Every key of the configuration: opcua.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -97,13 +97,15 @@ class Wording:
         for text, where in {text: where for where, text in _templates_of(self._words)}.items():
             unknown = meta.find_undeclared_variables(self._environment.parse(text)) - KNOWN - {"range"}
             if unknown:
-                raise ValueError(f"{where}: {sorted(unknown)[0]!r} is not known; docs/alerts.md lists what a template sees")
+                raise ValueError(
+                    f"{where}: {sorted(unknown)[0]!r} is not known; docs/how-to/alerts.md lists what a template sees"
+                )
         told = self._of_notice((TRIAL,), (), Occasion(0.0))
         for where, text in (("title", self._words.title), ("text", self._words.text)):
             try:
                 _filled(self._templates[text], told)
             except SURPRISES as error:
-                raise ValueError(f"{where}: {error}; docs/alerts.md lists what a template sees") from error
+                raise ValueError(f"{where}: {error}; docs/how-to/alerts.md lists what a template sees") from error
         return self
 
     @property

@@ -1,4 +1,4 @@
-"""Who may ask: each rule of docs/api.md, by itself and on the application."""
+"""Who may ask: each rule of docs/reference/api.md, by itself and on the application."""
 
 import http.cookies
 import time
@@ -110,6 +110,8 @@ def test_without_the_token_there_is_the_page_and_nothing_of_the_plant(guarded: C
         "/metrics",
         "/openapi.json",
         "/docs",
+        "/docs/index.html",
+        "/routes",
         "/alerts",
         "/gap/vmc/report",
         "/nothing",

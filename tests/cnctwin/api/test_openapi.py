@@ -73,7 +73,7 @@ def test_every_answer_that_is_json_has_a_contract(document: dict[str, Any]) -> N
 
 def test_the_list_of_routes_needs_no_network_and_no_script() -> None:
     with client_of() as client:
-        page = client.get("/docs").text
+        page = client.get("/routes").text
     assert re.findall(r"https?://", page) == []
     assert "<script" not in page
     assert "style=" not in page

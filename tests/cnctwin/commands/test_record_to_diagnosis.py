@@ -1,4 +1,4 @@
-"""A servo-rate case of a machine is three commands: `record`, `gap case`, `gap diagnose`, as docs/recording.md says."""
+"""A servo-rate case of a machine is three commands: `record`, `gap case`, `gap diagnose`, as docs/how-to/recording.md says."""
 
 import json
 from collections.abc import Iterator

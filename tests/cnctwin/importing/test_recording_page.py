@@ -1,4 +1,4 @@
-"""docs/recording.md is true: its map can be read, its paths are there, and its table is that of the catalogue."""
+"""docs/how-to/recording.md is true: its map can be read, its paths are there, and its table is that of the catalogue."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from cnctwin.importing.column_map import read_map
 from twin.effects.catalogue import catalogue
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "recording.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "recording.md").read_text(encoding="utf-8")
 
 
 def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
@@ -26,5 +26,5 @@ def test_each_effect_stands_beside_the_columns_in_which_it_shows() -> None:
 
 def test_paths_and_links_of_the_page_lead_somewhere() -> None:
     assert [path for path in re.findall(r"`(cnctwin/[\w./]+)`", PAGE) if not (ROOT / path).exists()] == []
-    links = re.findall(r"\]\(([\w.-]+)", PAGE)
-    assert links and all((ROOT / "docs" / link).exists() for link in links)
+    links = re.findall(r"\]\(([\w./-]+)", PAGE)
+    assert links and all((ROOT / "docs" / "how-to" / link).exists() for link in links)

@@ -39,7 +39,7 @@ SURFACE = {
     "watch",
     "write_run",
 }
-PAGE = Path(__file__).parents[3] / "docs" / "python.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "python.md"
 
 
 def loaded_after(text: str) -> set[str]:

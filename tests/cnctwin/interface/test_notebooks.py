@@ -63,7 +63,7 @@ def test_each_says_who_it_is_for_and_what_one_sees(name: str) -> None:
     first = cells_of(name)[0]
     assert first.cell_type == "markdown" and first.source.startswith("# ")
     assert "For whoever" in first.source and "What you will see:" in first.source
-    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
     assert f"(notebooks/{name}.ipynb)" in page
 
 

@@ -1,4 +1,4 @@
-"""docs/python.md shows what is there: each name, attribute and argument in its code."""
+"""docs/reference/python.md shows what is there: each name, attribute and argument in its code."""
 
 import ast
 import inspect
@@ -10,7 +10,7 @@ import pytest
 
 import cnctwin
 
-PAGE = (Path(__file__).parents[3] / "docs" / "python.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
 SECTIONS = {
     "A store": {"store": cnctwin.Store},
     "Run logs": {"run": cnctwin.Run},

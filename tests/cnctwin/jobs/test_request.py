@@ -122,7 +122,7 @@ def test_a_refusal_goes_where_the_request_says_as_far_as_it_can_be_read() -> Non
         ({"machine_toml": "[machine"}, "machine_toml: is not TOML"),
         (
             {"machine_toml": LIMITED + "\n[tool]\nteeth = 2"},
-            "machine_toml: 3 faults; see docs/machine.md\n  tool.diameter_mm is missing",
+            "machine_toml: 3 faults; see docs/reference/machine.md\n  tool.diameter_mm is missing",
         ),
     ],
 )

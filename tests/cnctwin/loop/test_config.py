@@ -10,7 +10,7 @@ from cnctwin.loop.config import LoopConfig, LoopConfiguration, Promote, loop_con
 from processors.errors import ConfigurationError
 from processors.running.runtime import configured
 
-PAGE = Path(__file__).parents[3] / "docs" / "loop.md"
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "loop.md"
 
 
 def test_the_page_shows_every_key_with_its_default() -> None:

@@ -111,7 +111,7 @@ def test_blocks_over_tcp_become_values() -> None:
 
 def test_the_sender_that_the_docs_show_is_read_and_gives_what_they_say() -> None:
     """1 g at 100 Hz."""
-    snippet = (PROJECT / "docs" / "vibration.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    snippet = (PROJECT / "docs" / "how-to" / "vibration.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = str(listener.getsockname()[1])
     snippet = snippet.replace("9500", port).replace("range(600)", "range(26)").replace("    time.sleep(COUNT / RATE)\n", "")

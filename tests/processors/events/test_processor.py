@@ -17,7 +17,7 @@ from sparkplug.quality import Quality
 from tests.cnctwin.memory.replay.mazak import mazak_hours
 from tests.processors.streams import T0_MS, birth, data, death, engine_of, event, published, reading
 
-SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "part_record.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "reference" / "part_record.schema.json").read_text(encoding="utf-8"))
 READY = {
     "exec_state": "READY",
     "program": "O1",

@@ -52,6 +52,6 @@ def test_the_health_metrics_show_the_first_twenty() -> None:
 
 
 def test_the_page_states_the_defaults() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "security.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "security.md").read_text(encoding="utf-8")
     for field in fields(DEFAULTS):
         assert f"| `{field.name}` | {getattr(DEFAULTS, field.name):,} |" in page

@@ -328,7 +328,7 @@ def test_everything_is_checked_before_anything_connects(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as wrong:
         configured(["thermal", "cutting_force"], config)
     assert str(wrong.value).split("\n  ") == [
-        f"{config}: 4 faults; see docs/processors.md",
+        f"{config}: 4 faults; see docs/reference/processors.md",
         "[gapp] is not known; did you mean gap?",
         "[thermal] tick is not known; did you mean tick_s?",
         "[thermal.machines.vmc] gap_s_max = 0: must be above 0",

@@ -222,8 +222,8 @@ def test_only_its_own_folder_knows_it(dialect: Dialect) -> None:
 @every_dialect
 def test_its_page_says_what_is_read_of_it(dialect: Dialect) -> None:
     name = f"part-programs-{dialect.name}.md"
-    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8")
     assert f'dialect = "{dialect.name}"' in page
     assert [suffix for suffix in dialect.suffixes if f"`{suffix}`" not in page] == []
-    hub = (ROOT / "docs" / "part-programs.md").read_text(encoding="utf-8")
+    hub = (ROOT / "docs" / "reference" / "part-programs.md").read_text(encoding="utf-8")
     assert f"({name})" in hub and f"| `{dialect.name}` |" in hub

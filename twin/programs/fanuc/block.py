@@ -71,7 +71,7 @@ class Words:
         tenths = round(value * 10.0)
         group = GROUPS.get(tenths)
         if group is None or abs(value * 10.0 - tenths) > 1e-6:
-            raise RefusedError(text, "this G code is not known; docs/part-programs-fanuc.md lists those that are")
+            raise RefusedError(text, "this G code is not known; docs/reference/part-programs-fanuc.md lists those that are")
         if group == "once" and group in self.codes and self.codes[group] != tenths:
             raise RefusedError(text, f"cannot stand in one block with {self.written[group]}; write two blocks")
         self.codes[group] = tenths

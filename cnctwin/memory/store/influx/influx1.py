@@ -1,7 +1,8 @@
 """InfluxDB 1.x as a server for lines (https://docs.influxdata.com/influxdb/v1/tools/api/#write-http-endpoint).
 
 What InfluxDB 2 has as buckets are databases here, so that both are asked in the same words; they are made where they are missing,
-without an end: `docs/influx.md` says how to give them one. An acknowledged write is in its log on the disk (wal-fsync-delay 0).
+without an end: `docs/how-to/influx.md` says how to give them one. An acknowledged write is in its log on
+the disk (wal-fsync-delay 0).
 """
 
 from cnctwin.memory.store.contract import StoreError
@@ -40,7 +41,9 @@ class Influx1:
         except (StoreError, AttributeError, TypeError) as error:
             trouble = str(error)
         if trouble:
-            raise ServerAwayError(f"database {database!r} is missing and cannot be made: {trouble}; make it, see docs/influx.md")
+            raise ServerAwayError(
+                f"database {database!r} is missing and cannot be made: {trouble}; make it, see docs/how-to/influx.md"
+            )
 
     def incarnation(self) -> str:
         """Not asked: an acknowledged write is on the disk."""

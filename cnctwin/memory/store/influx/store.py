@@ -223,7 +223,9 @@ class ServerStore(ReadOnlyServer):
         account = self._spool.account()
         evicted = ", ".join(f"{n} samples lost ({name})" for name, n in account.items() if name.startswith("evicted") and n)
         pins = (
-            "" if self._knows_texts or not self._pins.all() else "pins cannot outlive this server's retention: see docs/influx.md"
+            ""
+            if self._knows_texts or not self._pins.all()
+            else "pins cannot outlive this server's retention: see docs/how-to/influx.md"
         )
         troubles = [self._sender.trouble, evicted, self._sender.refused, self._complaint, pins]
         return Status(

@@ -54,6 +54,8 @@ export function openHelp(app, everywhere) {
   const own = app.view?.keys ?? [];
   show(
     "Keys and marks",
+    el("p", {}, el("a", { href: "docs/", target: "_blank", rel: "noopener" }, "Documentation"), ": tutorials, guides, reference"),
+    el("br"),
     own.length ? [el("h3", {}, app.view.title), list(own), el("br")] : null,
     el("h3", {}, "Everywhere"),
     list([...everywhere, [["Tab"], "the next thing that can be pressed"], [["Esc"], "closes a dialog, leaves a field"]]),

@@ -4,7 +4,7 @@ import { moment, plain } from "./text.js";
 
 const SAID = { true: "acknowledged", false: "not acknowledged" };
 
-/** `alarms` and `alarm_history` (docs/signals.md): each alarm as a person would say it, separated by semicolons. */
+/** `alarms` and `alarm_history` (docs/reference/signals.md): each alarm as a person would say it, separated by semicolons. */
 function alarm(one) {
   const since = typeof one.since === "string" ? Date.parse(one.since) : NaN;
   const parts = [

@@ -71,7 +71,7 @@ def test_what_only_the_library_can_read_is_a_null_that_says_the_way_out(server: 
     rows = {row.signal: row for row in describe(EdgeConfig(source=FocasConfig(port=server.port)))}
     assert (rows[signal].value, rows[signal].source) == (None, "none")
     assert rows[signal].reason == (
-        'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/edge-focas.md)'
+        'only by FANUC\'s own library: set focas.backend = "library" and focas.library (docs/how-to/edge-focas.md)'
     )
 
 

@@ -19,7 +19,7 @@ from twin.programs import Arc, Linear, Move, Rapid
 from twin.programs.klartext.interpreter import interpret
 
 HERE = Path(__file__).parent / "published"
-PAGE = Path(__file__).parents[4] / "docs" / "part-programs-klartext.md"
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "part-programs-klartext.md"
 NAMES = sorted(path.stem for path in HERE.glob("*.h"))
 SAME = 1e-6
 

@@ -72,7 +72,7 @@ def verdict_of(text: str) -> Verdict:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the message"
         given = "missing" if first["type"] == "missing" else repr(first["input"])[:40]
-        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/verdicts.md shows a verdict") from None
+        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/how-to/verdicts.md shows a verdict") from None
 
 
 def corrected(model: PartsModel, own: Own, verdict: Verdict) -> Own:

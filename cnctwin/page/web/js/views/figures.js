@@ -1,4 +1,4 @@
-// Production figures: OEE by machine and shift with its parts, stops by reason, parts with their energy (docs/production.md).
+// Production figures: OEE by machine and shift with its parts, stops by reason, parts with their energy (docs/how-to/production.md).
 
 import { get, query } from "../api.js";
 import { serverNow } from "../clock.js";
