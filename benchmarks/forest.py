@@ -42,7 +42,7 @@ CENTRE, SPREAD = np.array([40.0, 6000.0, 1000.0, 40.0, 0.2]), np.array([10.0, 10
 
 
 def microseconds_a_row(score: Callable[[Any], object], batches: list[Any], rows: int) -> float:
-    """Of one pass over all batches."""
+    """Return the microseconds that a row takes in one pass over all batches."""
     began = time.perf_counter()
     for batch in batches:
         score(batch)
@@ -80,7 +80,7 @@ def in_turn_us(scorer: IsolationScorer, rows: Floats, rounds: int) -> float:
 
 
 def same_bits(ours: Floats, theirs: Floats) -> str:
-    """How many, of how many."""
+    """Return how many, of how many."""
     return f"{int((ours.view(np.int64) == np.ascontiguousarray(theirs).view(np.int64)).sum())} of {len(ours)}"
 
 
@@ -95,7 +95,7 @@ def loading_ms(load: Callable[[], object]) -> float:
 
 
 def size_bytes(folder: Path) -> int:
-    """Of all files in it."""
+    """Return the bytes of all files in it."""
     return sum(path.stat().st_size for path in folder.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""What identification reaches on recordings: the figures of README and docs/how-to/identification.md.
+"""Measure what identification reaches on recordings: the figures of README and docs/how-to/identification.md.
 
     .venv/bin/python benchmarks/identification.py [folder of the cases]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How much of one core the joint anomaly score of 1,000 machines at 10 Hz takes: engine, model, gate and common mode.
+"""Measure how much of one core the joint anomaly score of 1,000 machines at 10 Hz takes: engine, model, gate and common mode.
 
     .venv/bin/python benchmarks/joint_anomaly.py [--machines N] [--cell N] [--seconds S] [--json]
     .venv/bin/python benchmarks/joint_anomaly.py --parts [--machines N] [--cell N] [--seconds S] [--json]

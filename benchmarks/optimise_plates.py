@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What an optimiser may claim on ten recorded plates: its predicted times beside the recorded ones first, then the claim.
+"""Measure what an optimiser may claim on ten recorded plates: its predicted times beside the recorded ones first, then the claim.
 
     .venv/bin/python benchmarks/optimise_plates.py [--json]
 
@@ -54,7 +54,7 @@ def print_savings(title: str, several: Sequence[Savings]) -> None:
 
 
 def print_claim(found: Study) -> None:
-    """What may be claimed, and what that does not prove."""
+    """Print what may be claimed, and what that does not prove."""
     print(f"proven choices, predicted in the order of {REFERENCE} with its knobs (rapid at 52 %), s")
     for tool, options in found.options.items():
         for n, one in enumerate(options):

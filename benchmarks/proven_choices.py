@@ -35,7 +35,7 @@ CONFIDENCE = 0.95
 
 
 class Choice(NamedTuple):
-    """What a program says for a tool: spindle speed, and the feeds in mm/min of its cutting moves (from slow to fast)."""
+    """Holds what a program says for a tool: spindle speed, and the feeds in mm/min of its cutting moves (from slow to fast)."""
 
     rpm: float
     feeds_mm_min: tuple[float, ...]
@@ -94,7 +94,7 @@ def spans(path: Path) -> list[tuple[int, slice]]:
 
 
 def choice_of(path: Path, span: slice) -> Choice:
-    """What `path` says between two tool changes."""
+    """Return what `path` says between two tool changes."""
     cutting = path.feed_mm_min[span][path.kind[span] != Kind.RAPID]
     turning = {event.value for event in path.events if _turns(path, event.segment, event.kind, span) and event.value}
     (rpm,) = turning  # one speed for each tool in all ten programs
@@ -106,7 +106,7 @@ def _turns(path: Path, segment: int, kind: EventKind, span: slice) -> bool:
 
 
 def is_proven(program: RecordedProgram, span: slice, choice: Choice) -> bool:
-    """Whether this run cut the section with its programmed feeds and speed."""
+    """Return whether this run cut the section with its programmed feeds and speed."""
     path, run = program.path, program.run
     cutting = path.kind[span] != Kind.RAPID
     way, ratio = path.length_mm[span][cutting], program.overrides()[0][span][cutting]
@@ -138,7 +138,8 @@ def cut_mm(path: Path, span: slice) -> float:
 
 
 def savings(name: str, rows: Sequence[tuple[float, float, float, bool]]) -> Savings:
-    """Of (recorded, predicted, length over feed, first) of each run: pairs of which both or none begin their program."""
+    """Return the savings of (recorded, predicted, length over feed, first) of each run: pairs of which both or none begin
+    their program."""
     pairs = [(a, b) for a, b in combinations(rows, 2) if a[3] == b[3]]
     saved = np.array([[a[k] - b[k] for k in range(3)] for a, b in pairs])
     recorded, predicted, simple = saved.T
@@ -219,7 +220,7 @@ def proven(
 
 
 def interval(errors: Sequence[float], share: float = CONFIDENCE) -> tuple[float, float]:
-    """Where the relative error of one more program is expected, from those of some: Student's prediction interval."""
+    """Return where the relative error of one more program is expected, from those of some: Student's prediction interval."""
     n = len(errors)
     half = float(t.ppf(0.5 + share / 2.0, n - 1)) * statistics.stdev(errors) * math.sqrt(1.0 + 1.0 / n)
     return statistics.mean(errors) - half, statistics.mean(errors) + half
@@ -354,7 +355,7 @@ def batch_gap_s(host: RecordedProgram, programs: Sequence[RecordedProgram], mode
 
 
 def saved_interval(runs: Sequence[Sequence[Section]], share: float = CONFIDENCE) -> tuple[float, float]:
-    """Where the error of a predicted saving between two programs is expected, relative to the time of the first.
+    """Return where the error of a predicted saving between two programs is expected, relative to the time of the first.
 
     The errors of two runs are taken as independent of each other: the standard deviation is √2 times that of one.
     """

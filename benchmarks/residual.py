@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the residual model gains, and what it refuses: simulated days, and a real machine's day.
+"""Measure what the residual model gains, and what it refuses: simulated days, and a real machine's day.
 
     .venv/bin/python benchmarks/residual.py [--trees N] [--nulls N] [--data FOLDER] [--json]
 
@@ -98,7 +98,7 @@ def elsewhere(done: Outcome, recorded: Recorded) -> dict[str, float]:
 
 
 def started_midway(done: Outcome, day: Recorded, thermal: Thermal, physics: Physics) -> dict[str, float]:
-    """The physics and the means begin anew in the middle of a shift: the four hours after it."""
+    """The physics and the means begin again in the middle of a shift: the four hours after it."""
     half = len(day.t_s) // 2
     part = slice(half, half + 4 * 3600)
     told = {name: Samples(day.t_s[part], values[part]) for name, values in day.signals.items() if name != PHYSICS}

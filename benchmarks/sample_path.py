@@ -63,7 +63,7 @@ START_MS = 1_790_000_000_000
 
 
 def figures(values: list[float]) -> tuple[float, float, float, float]:
-    """What every variant computes."""
+    """Return what every variant computes."""
     low, high = min(values), max(values)
     return sum(values) / len(values), low, high, high - low
 

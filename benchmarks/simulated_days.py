@@ -54,7 +54,8 @@ def ordinary_days(count: int) -> tuple[Day, ...]:
 def simulated_days(
     days: Sequence[Day], thermal: Thermal, seed: int, lacks: Mapping[str, float] | None = None, start_day: int = 0
 ) -> Recorded:
-    """The days as a recording with the physics beside it. thermal: constants of the twin; lacks: what its physics has not got."""
+    """The days as a recording with the physics beside it. thermal: constants of the twin; lacks: what its physics does not
+    have."""
     rng = np.random.default_rng(seed)
     columns: dict[str, list[Floats]] = {name: [] for name in (*CYCLE, AMBIENT, MEASURED, PHYSICS)}
     t_s, stretch = [], []

@@ -293,7 +293,7 @@ def measure(ticks: int, repeats: int, folder: Path) -> dict[str, dict[str, dict[
 
 
 def report(name: str, groups: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """What is printed of one motion."""
+    """Return what is printed of one motion."""
     servo, effects, chain, stages = groups["servo"], groups["effects"], groups["chain"], groups["stages"]
     plain = servo.get("C, traces", math.nan)
     sticking = ", ".join(f"{axis} {100 * part:.0f} %" for axis, part in groups["sticking"].items())

@@ -87,7 +87,7 @@ class Stack:
 
 
 def said(state_file: Path, key: str) -> str:
-    """What a child says of itself, once it does."""
+    """Return what a child says of itself, once it does."""
     deadline_s = time.monotonic() + 120.0
     while time.monotonic() < deadline_s:
         try:
@@ -106,7 +106,7 @@ def pss_mb(pid: int) -> float:
 
 
 class PageReader(threading.Thread):
-    """What a browser takes: the stream of the fleet and of one machine."""
+    """Holds what a browser takes: the stream of the fleet and of one machine."""
 
     def __init__(self, url: str) -> None:
         super().__init__(daemon=True)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How often the nightly validation and the model registry are wrong, where the truth is known.
+"""Measure how often the nightly validation and the model registry are wrong, where the truth is known.
 
     .venv/bin/python benchmarks/validation.py [--cases 1000] [--json]
 
@@ -64,7 +64,7 @@ def _mean(sums: Floats) -> Floats:
 
 
 def wins(cases: int, gain: float) -> Iterator[dict[str, float]]:
-    """How often a challenger wins whose mean squared error is smaller by `gain`; half of its error is the champion's."""
+    """Return how often a challenger wins whose mean squared error is smaller by `gain`; half of its error is the champion's."""
     for memory_s in MEMORIES_S:
         won = 0
         for case in range(cases):

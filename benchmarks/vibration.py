@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What one second of raw acceleration at 10 kHz costs, beside scipy's plain band-pass and rms, in one run.
+"""Measure what one second of raw acceleration at 10 kHz costs, beside scipy's plain band-pass and rms, in one run.
 
     .venv/bin/python benchmarks/vibration.py [--seconds N] [--block-s S] [--json]
 

@@ -48,7 +48,8 @@ class Config(ProcessorConfig):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What of a machine is announced to Home Assistant: platform and id of each entity; nothing where it is not asked for."""
+    """Holds what of a machine is announced to Home Assistant: platform and id of each entity; nothing where it is not asked
+    for."""
 
     announced: tuple[str, ...] = ()
 

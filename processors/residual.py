@@ -100,7 +100,7 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """version: of the model that `memory` and `gain` belong to; another begins anew."""
+    """version: of the model that `memory` and `gain` belong to; another begins again."""
 
     version: str = ""
     memory: Memory = field(default_factory=Memory)

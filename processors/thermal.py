@@ -5,8 +5,8 @@
 with every effect on heat and on the sensor that the machine's description has. Where the ambient temperature has never been
 known, temperatures are counted from it: the rise goes on, only the absolute temperature is null then. Inputs are held between
 messages. Where speed or load is unknown for a while, the estimate is null and bridges the time with the last known heat; after
-gap_s_max of that, or of silence, it starts anew, and `twin/spindle_temp_basis` says from what. Another description takes the heat
-over.
+gap_s_max of that, or of silence, it starts again, and `twin/spindle_temp_basis` says from what. Another description takes the
+heat over.
 """
 
 from collections.abc import Mapping, Sequence

@@ -2,7 +2,7 @@
 
 A block is an array metric, `vibration_block_g`, stamped with the time of its last sample; the next one is stamped its own length
 later. Blocks are filtered as one stream (twin.vibration). A block that is lost, late by half its length, clipped, dead, of wrong
-rate or length, or not of finite numbers breaks the stream: the figures are null with the reason, the filters start anew, and the
+rate or length, or not of finite numbers breaks the stream: the figures are null with the reason, the filters start again, and the
 first `settle_s` after it is not counted. A block longer than the window is a window.
 """
 

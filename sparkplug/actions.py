@@ -1,4 +1,4 @@
-"""What a session asks of its transport, and the message of a host application's STATE."""
+"""Describe what a session asks of its transport, and the message of a host application's STATE."""
 
 import json
 from typing import NamedTuple
@@ -64,7 +64,7 @@ Action = Acknowledge | Barrier | Publish | Subscribe | Disconnect | WalkToNextSe
 
 
 class HostState(NamedTuple):
-    """Whether a host application is online, since when (ms since 1970, UTC)."""
+    """Says whether a host application is online, since when (ms since 1970, UTC)."""
 
     online: bool
     timestamp_ms: int

@@ -1,4 +1,4 @@
-"""Where a broker is and how to get in."""
+"""Describe where a broker is and how to get in."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path

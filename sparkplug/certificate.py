@@ -1,4 +1,4 @@
-"""What a birth certificate declares: a table of metrics with their aliases, types and present values."""
+"""Describe what a birth certificate declares: a table of metrics with their aliases, types and present values."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress

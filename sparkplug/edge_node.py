@@ -93,7 +93,7 @@ class EdgeNode:
 
     @property
     def online(self) -> bool:
-        """Whether the node is born: connected, and the primary host, if one is needed, is online."""
+        """Return whether the node is born: connected, and the primary host, if one is needed, is online."""
         return self._session.phase is Phase.BORN
 
     @property
@@ -103,7 +103,7 @@ class EdgeNode:
 
     @property
     def reconnects(self) -> int:
-        """How often the connection was made again."""
+        """Return how often the connection was made again."""
         return max(self._connection.connects - 1, 0)
 
     @property
@@ -113,7 +113,7 @@ class EdgeNode:
 
     @property
     def unsent(self) -> int:
-        """How many messages that `publish` took were dropped with a connection that ended before it took them.
+        """Return how many messages that `publish` took were dropped with a connection that ended before it took them.
 
         What was already in the socket of such a connection is not known: at QoS 0 nobody confirms it.
         """
@@ -121,7 +121,7 @@ class EdgeNode:
 
     @property
     def backlog(self) -> int:
-        """How many messages wait for the broker to take them."""
+        """Return how many messages wait for the broker to take them."""
         return self._connection.backlog
 
     def declare_device(self, device: str, metrics: Iterable[MetricSpec]) -> None:

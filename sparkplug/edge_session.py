@@ -35,7 +35,7 @@ Aliases = dict[tuple[str | None, str], int]
 
 
 class Phase(Enum):
-    """Where a session stands."""
+    """Says where a session stands."""
 
     OFFLINE = "offline"
     WAITING = "waiting"

@@ -1,4 +1,4 @@
-"""What can go wrong in this package.
+"""Describe what can go wrong in this package.
 
 SparkplugError
 ├── TopicError            a topic or an id that the specification does not allow

@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Mark(Enum):
-    """What stands in the inbox between messages."""
+    """Holds what stands in the inbox between messages."""
 
     CONNECTED = "connected"
     LOST = "lost"
@@ -141,12 +141,12 @@ class HostApplication:
 
     @property
     def online(self) -> bool:
-        """Whether the broker has accepted the connection and the host knows it."""
+        """Return whether the broker has accepted the connection and the host knows it."""
         return self._session.online
 
     @property
     def reconnects(self) -> int:
-        """How often the connection was made again."""
+        """Return how often the connection was made again."""
         return max(self._connection.connects - 1, 0)
 
     @property
@@ -156,7 +156,7 @@ class HostApplication:
 
     @property
     def queue_depth(self) -> int:
-        """How many messages wait to be polled."""
+        """Return how many messages wait to be polled."""
         return len(self._inbox)
 
     @property
@@ -166,7 +166,7 @@ class HostApplication:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What the session has counted: births, data, holes, lost, late, malformed, …"""
+        """Return what the session has counted: births, data, holes, lost, late, malformed, …"""
         return dict(self._session.counts)
 
     @property
@@ -175,7 +175,7 @@ class HostApplication:
         return self._session.admission.quarantine.table()
 
     def picture(self, node: NodeId) -> NodePicture | None:
-        """What is known of a node; read it only in the thread that polls."""
+        """Return what is known of a node; read it only in the thread that polls."""
         return self._session.picture(node)
 
     def nodes(self) -> tuple[NodeId, ...]:

@@ -166,7 +166,7 @@ class HostSession:
     # What the application asks.
 
     def picture(self, node: NodeId) -> NodePicture | None:
-        """What is known of a node; None where nothing was heard of it."""
+        """Return what is known of a node; None where nothing was heard of it."""
         watched = self._nodes.get(node)
         return None if watched is None else watched.picture
 

@@ -1,4 +1,4 @@
-"""What an application declares, changes and reads; the wire forms are in `values`."""
+"""Describe what an application declares, changes and reads; the wire forms are in `values`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ class MetricSpec:
             raise TopicError("a metric needs a name")
 
     def first(self, now_ms: int) -> "Change":
-        """What is true before anything was published.
+        """Return what is true before anything was published.
 
         >>> MetricSpec("spindle_rpm", DataType.DOUBLE).first(0).reason
         'not known yet'

@@ -1,4 +1,4 @@
-"""What a host application knows of one edge node and its devices."""
+"""Describe what a host application knows of one edge node and its devices."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ _PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN})
 
 
 class Binding(NamedTuple):
-    """What the birth said of a metric: enough to read its data."""
+    """Holds what the birth said of a metric: enough to read its data."""
 
     name: str
     datatype: DataType
@@ -162,7 +162,7 @@ class Owner:
         return tuple(readings.values())
 
     def leave(self, holders: dict[int, "Owner"]) -> None:
-        """Take its aliases out of the table; what it says from now on is read anew."""
+        """Take its aliases out of the table; what it says from now on is read again."""
         for old in self.aliases:
             if holders.get(old) is self:
                 del holders[old]
@@ -204,7 +204,7 @@ class NodePicture:
 
     @property
     def online(self) -> bool:
-        """Whether the node is born and not dead."""
+        """Return whether the node is born and not dead."""
         return self.own.online
 
     def owner(self, device: str | None) -> Owner | None:
@@ -319,7 +319,7 @@ def _declared(metric: Any, timestamp_ms: int) -> tuple[int | None, Binding | Non
 
 
 def tells_quality(payload: bytes) -> bool:
-    """Whether a payload can hold a quality or its reason at all: their names would stand in its bytes."""
+    """Return whether a payload can hold a quality or its reason at all: their names would stand in its bytes."""
     return _QUALITY_BYTES in payload or _REASON_BYTES in payload
 
 

@@ -1,4 +1,4 @@
-"""How far a value may be trusted (Sparkplug 3.0.0, 6.4.14: the property `Quality`)."""
+"""Describe how far a value may be trusted (Sparkplug 3.0.0, 6.4.14: the property `Quality`)."""
 
 from enum import IntEnum
 

@@ -1,4 +1,4 @@
-"""How often a birth is repeated on request, and how often one is requested.
+"""Describe how often a birth is repeated on request, and how often one is requested.
 
 Many hosts may miss the same birth at once. The edge answers all requests of a window with one birth; a host waits a moment
 before it asks, asks no more if a birth has come meanwhile, and waits longer each time that a node does not answer.
@@ -25,7 +25,7 @@ class RebirthAnswer:
 
     @property
     def is_due(self) -> bool:
-        """Whether a request waits for its answer."""
+        """Return whether a request waits for its answer."""
         return self._due_ms is not None
 
     def request(self, now_ms: int) -> bool:

@@ -23,7 +23,7 @@ class Numbered(NamedTuple):
 
 
 class Verdict(Enum):
-    """What became of a message."""
+    """Holds what became of a message."""
 
     TAKEN = "taken"
     HELD = "held"
@@ -58,7 +58,7 @@ class SequenceWindow:
         return lost
 
     def is_next(self, seq: int, timestamp_ms: int) -> bool:
-        """Whether a message is simply the next one and nothing is held: then it is noted, and needs no `take`."""
+        """Return whether a message is simply the next one and nothing is held: then it is noted, and needs no `take`."""
         if seq != self._expected or self._held:
             return False
         self._expected = (seq + 1) % 256
@@ -94,7 +94,7 @@ class SequenceWindow:
         return self._run((numbered,), lost, Verdict.SLOPPY if repeated else Verdict.TAKEN)
 
     def expire(self, now_ms: int) -> Delivery | None:
-        """What is delivered although messages before it are missing, once the timeout is over."""
+        """Return what is delivered although messages before it are missing, once the timeout is over."""
         if self._waiting_since_ms is None or now_ms - self._waiting_since_ms < self.reorder_timeout_ms:
             return None
         return self.flush()
@@ -108,7 +108,7 @@ class SequenceWindow:
         return self._run(held, lost, Verdict.TAKEN) if held else Delivery((), lost, Verdict.TAKEN)
 
     def _missing(self) -> int:
-        """How many numbers between the expected one and the last held one never came."""
+        """Return how many numbers between the expected one and the last held one never came."""
         if not self._held:
             return 0
         return max((seq - self._expected) % 256 for seq in self._held) + 1 - len(self._held)

@@ -14,7 +14,7 @@ from sparkplug.errors import TopicError
 
 NAMESPACE = "spBv1.0"
 STATE_PREFIX = f"{NAMESPACE}/STATE/"
-REMEMBERED_MAX = 1024  # a longer topic is split anew each time
+REMEMBERED_MAX = 1024  # a longer topic is split again each time
 _FORBIDDEN = ("+", "/", "#")
 
 
@@ -32,12 +32,12 @@ class Verb(StrEnum):
 
     @property
     def of_device(self) -> bool:
-        """Whether the topic names a device."""
+        """Return whether the topic names a device."""
         return self.value.startswith("D")
 
     @property
     def counted(self) -> bool:
-        """Whether the message carries a sequence number: all but NDEATH and commands (6.4.2)."""
+        """Return whether the message carries a sequence number: all but NDEATH and commands (6.4.2)."""
         return self not in (Verb.NDEATH, Verb.NCMD, Verb.DCMD)
 
 

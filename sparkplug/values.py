@@ -81,7 +81,7 @@ class Template:
 
 @dataclass(frozen=True, slots=True)
 class MetaData:
-    """What a BYTES or FILE value is (6.4.8)."""
+    """Holds what a BYTES or FILE value is (6.4.8)."""
 
     is_multi_part: bool | None = None
     content_type: str | None = None

@@ -117,7 +117,7 @@ def scale_on(on: str, letters: Letters) -> float:
 
 
 def _factor(path: str, letters: Letters) -> float:
-    """How many units inside one unit of the figure at a path of the file is."""
+    """Return how many units inside one unit of the figure at a path of the file is."""
     parts = path.split(".")
     return inside_name(parts[-1], letters[parts[1]])[1] if len(parts) > 2 and parts[0] == "axes" and parts[1] in letters else 1.0
 

@@ -1,6 +1,6 @@
 """Run log: one recording of one machine, as columns over the time since its start (formats, section 3).
 
-A sample that a signal has not got is NaN, or None where the column is text. Signals of several rates share one log.
+A sample that a signal does not have is NaN, or None where the column is text. Signals of several rates share one log.
 """
 
 import csv

@@ -1,4 +1,4 @@
-"""What vibration at the edge costs: one sensor's stream through the fold, beside scipy's filter on the same samples.
+"""Measure what vibration at the edge costs: one sensor's stream through the fold, beside scipy's filter on the same samples.
 
     python -m benchmarks.edges.accelerometer [--seconds 20]
 

@@ -1,4 +1,4 @@
-"""How well the clock fold finds a control's clock, and how often the truth lies in the spread that it states.
+"""Measure how well the clock fold finds a control's clock, and how often the truth lies in the spread that it states.
 
     python -m benchmarks.edges.clock [--hours 2] [--runs 40] [--seed 1] [--recording okuma.txt]
 
@@ -62,7 +62,7 @@ CASES = (
 
 
 class Estimate(NamedTuple):
-    """What was published as of a moment, and the truth."""
+    """Holds what was published as of a moment, and the truth."""
 
     at_s: float
     offset_s: float
@@ -82,7 +82,7 @@ class Truth(NamedTuple):
 
 
 def heard(case: Case, truth: Truth, seconds: float, chance: random.Random) -> Iterator[clock.Heard]:
-    """What an edge hears of this clock, in the order of arrival."""
+    """Yield what an edge hears of this clock, in the order of arrival."""
     at_s, last_s = 0.0, 0.0
     while at_s < seconds:
         there_s, back_s = case.latency_s(chance), case.latency_s(chance)

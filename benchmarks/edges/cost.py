@@ -1,4 +1,4 @@
-"""What an edge costs: the store, a day without a broker, and a gateway of many machines.
+"""Measure what an edge costs: the store, a day without a broker, and a gateway of many machines.
 
     .venv/bin/python benchmarks/edges/cost.py store            # append and drain, beside what SQLite can do at most
     .venv/bin/python benchmarks/edges/cost.py gateway          # 50 machines at 10 Hz in one process, share of a core
@@ -182,7 +182,7 @@ def gateway(machines: int, rate_hz: float, seconds: float, pin: bool) -> None:
 
 
 def xml_floor_us() -> float:
-    """What nobody can do without, in the same run."""
+    """Return what nobody can do without, in the same run."""
     document = streams(100, observations(1, 92, time.time()))
     return 1e6 * timed(lambda: [ET.fromstring(document) for _ in range(2_000)]) / 2_000
 
@@ -236,7 +236,7 @@ def stored(folder: Path) -> int:
 
 
 def main() -> None:
-    """What is asked for."""
+    """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("store", "gateway", "outage"))
     parser.add_argument("--rows", type=int, default=100_000)

@@ -24,7 +24,7 @@ def stamp(at_s: float) -> str:
 
 
 def observations(machine: int, sequence: int, at_s: float, *, all_of_it: bool = False) -> list[str]:
-    """What changed at this look."""
+    """Return what changed at this look."""
     told = stamp(at_s)
     turn = at_s + 7.0 * machine
     number = int(turn / CHANGE_EACH_S) % 20 + 1

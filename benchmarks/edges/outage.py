@@ -39,7 +39,7 @@ OFFERS = tuple(Offer(name, "simulated") for name in SIGNALS)
 
 
 def sweep(look: int) -> bytes:
-    """What the control shows."""
+    """Return what the control shows."""
     at_s = look / 10
     facts = [Fact(name, round(50 + 40 * math.sin(at_s / (3 + i)) + look % 7 * 1e-3, 4)) for i, name in enumerate(SIGNALS)]
     return Sweep("life", look, ORIGIN_MS + look * 100, tuple(facts), interval_ms=100).encode()

@@ -17,6 +17,6 @@ def constant_score(count: int) -> Floats:
 
 
 def one_feature_score(values: Floats, training: Floats) -> Floats:
-    """How far one signal (T,) is above its median in training, in robust standard deviations: a limit on a gauge."""
+    """Return how far one signal (T,) is above its median in training, in robust standard deviations: a limit on a gauge."""
     low, middle, high = np.percentile(training, [25.0, 50.0, 75.0])
     return np.asarray((values - middle) / max((high - low) / 1.349, 1e-9), dtype=np.float64)

@@ -71,5 +71,5 @@ def false_alerts_a_week(parts: Sequence[Detections]) -> Estimate:
 
 
 def delays_s(parts: Sequence[Detections]) -> list[float]:
-    """Of the events that were found."""
+    """Return the delays of the events that were found."""
     return [delay for part in parts for delay in part.delays_s if delay is not None]

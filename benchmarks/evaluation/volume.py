@@ -21,7 +21,7 @@ THRESHOLDS = 250
 
 
 def vus_pr(scores: Floats, events: Sequence[Range], buffer_max: int, steps: int = 8) -> float:
-    """Of scores (T,), −∞ or 0 where they are not judged; NaN without events.
+    """Return the measure of scores (T,), −∞ or 0 where they are not judged; NaN without events.
 
     >>> scores = np.array([0.0, 0.1, 0.9, 0.8, 0.0, 0.1])
     >>> vus_pr(scores, [Range(2, 4)], 0)

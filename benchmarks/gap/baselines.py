@@ -1,4 +1,4 @@
-"""What the gap diagnosis is measured against: three plain ways to name the cause of a gap.
+"""Measure what the gap diagnosis is measured against: three plain ways to name the cause of a gap.
 
 * smallest BIC: each effect of the catalogue is fitted in the sample, linearly about a typical size and with the machine's
   constants as nuisance; the one with the smallest Bayesian information criterion (Schwarz 1978) is named, where any lowers it
@@ -218,7 +218,8 @@ FEATURE_REGIMES = ("rest", "reversal", "acceleration", "constant speed -", "cons
 
 
 def features(machine: MachineFile, seen: list[Seen], residual: list[dict[str, Floats]]) -> Floats:
-    """Of each signal: rms, mean and drift over its floor; of an axis' signals by regime as well; 0 where there is none."""
+    """Return for each signal: rms, mean and drift over its floor; of an axis' signals by regime as well; 0 where there is
+    none."""
     row: list[float] = []
     for name in FEATURE_SIGNALS:
         at = next((i for i, one in enumerate(seen) if name in residual[i] and one.log.has(name)), None)

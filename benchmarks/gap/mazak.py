@@ -6,7 +6,7 @@
 Recordings: raw logs of the NIST Smart Manufacturing Systems Test Bed (CNCTWIN_DATA or ../shared/data). Each holds a single day,
 and none tells the surroundings: their temperature is assumed throughout. The description is the assumed one, since nobody has
 stated any. The live twin is the processor thermal, folded over the part to judge on: started at the reading of its beginning,
-then driven by speed and load alone; it starts anew where the agent said UNAVAILABLE for longer than `gap_s_max`. The same is
+then driven by speed and load alone; it starts again where the agent said UNAVAILABLE for longer than `gap_s_max`. The same is
 done with surroundings at the level of the standing spindle: they are open, and nothing that rests on 22 °C is known.
 """
 

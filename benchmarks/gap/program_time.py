@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Where recorded parts take longer than length over feed, which effects cause it, and how far the gap shrinks on other parts.
+"""Measure where recorded parts take longer than length over feed, which effects cause it, and how far the gap shrinks on other
+parts.
 
     .venv/bin/python benchmarks/gap/program_time.py [--without-overrides | --one-by-one] [--withheld] [--json]
 

@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def healthy(count: int, seed: int) -> None:
-    """What healthy machines show."""
+    """Print what healthy machines show."""
     largest: dict[str, tuple[float, float]] = {}
     accepted, worst = 0, 0.0
     for _, case in _cases(draw(count, seed, Sort.HEALTHY)):

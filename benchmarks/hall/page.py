@@ -1,8 +1,8 @@
 """docs/explanation/fleet.md: the tables and curves of what was measured, filled in between its markers.
 
     .venv/bin/python -m benchmarks.fleet --machines 4,20,50,100 --json many.json
-    .venv/bin/python -m benchmarks.hall.page --add many.json           # into docs/figures/fleet.json, then page and curves anew
-    .venv/bin/python -m benchmarks.hall.page                           # page and curves anew
+    .venv/bin/python -m benchmarks.hall.page --add many.json           # into docs/figures/fleet.json, then page and curves again
+    .venv/bin/python -m benchmarks.hall.page                           # page and curves again
 
 What is added replaces what there was of the same kind and tree. `--tree old` says that all trials of a file are of the older one.
 """
@@ -183,7 +183,7 @@ TABLES: dict[str, Callable[[Trials], str]] = {
 
 
 def filled(text: str, figures: dict[str, list[dict[str, Any]]]) -> str:
-    """Return a page with what stands between `<!-- fleet NAME -->` and `<!-- end -->` written anew."""
+    """Return a page with what stands between `<!-- fleet NAME -->` and `<!-- end -->` written again."""
 
     def written(found: re.Match[str]) -> str:
         kind = found[1]

@@ -30,7 +30,7 @@ LATE_S_MAX, MEMORY_MB_MAX = 5.0, 512.0
 ALERT_S_MAX = 60.0  # for which an alert is waited for
 LOOK_S = 0.5
 CONTROL = (
-    "agent"  # the simulated machine, which stands in for a control: it needs up to 550 MB where its kernels are compiled anew
+    "agent"  # the simulated machine, which stands in for a control: it needs up to 550 MB where its kernels are compiled again
 )
 
 

@@ -1,4 +1,4 @@
-"""What the page's server costs: machines on a real broker, `cnctwin serve`, and readers of its streams.
+"""Measure what the page's server costs: machines on a real broker, `cnctwin serve`, and readers of its streams.
 
     .venv/bin/python benchmarks/page/load.py [--machines 50] [--hz 10] [--signals 20] [--readers 4] [--seconds 20]
 
@@ -69,7 +69,7 @@ def births(given: argparse.Namespace) -> None:
 
 
 def fill(given: argparse.Namespace) -> None:
-    """What the cache takes when every trace holds as much as it may, without a broker and a decoder."""
+    """Measure what the cache takes when every trace holds as much as it may, without a broker and a decoder."""
     live, names, before_mb = LivePlant(), [f"signal_{number}" for number in range(given.signals)], memory_mb(os.getpid())
     nodes = [(NodeId("cnc", f"edge-m{number:02}"), f"m{number:02}") for number in range(given.machines)]
     live.take([_event(EventKind.BIRTH, *node, names, 0) for node in nodes], 0)

@@ -1,4 +1,4 @@
-"""How far the page is behind: fifty machines at 10 Hz on a real broker, `cnctwin serve`, and Debian's Chromium.
+"""Measure how far the page is behind: fifty machines at 10 Hz on a real broker, `cnctwin serve`, and Debian's Chromium.
 
     .venv/bin/python benchmarks/page/page.py [--machines 50] [--hz 10] [--seconds 20] [--restarts]
 
@@ -94,7 +94,7 @@ def publish(given: argparse.Namespace) -> None:
 
 
 def change(name: str, told: SignalValue, now_ms: int) -> Change:
-    """What changed, as an edge tells it."""
+    """Return what changed, as an edge tells it."""
     value = (
         float(told.value)
         if isinstance(told.value, int | float) and spec_of(name, told).datatype is DataType.DOUBLE
@@ -138,7 +138,7 @@ class Served:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Return where the page is."""
         return f"http://127.0.0.1:{self.port}"
 
     def start(self, machines: int) -> None:

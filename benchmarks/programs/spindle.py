@@ -1,4 +1,4 @@
-"""How fast a spindle runs up, read off recordings of any programs in which the axes stand and wait for it.
+"""Measure how fast a spindle runs up, read off recordings of any programs in which the axes stand and wait for it.
 
 Above its base speed ω_b a spindle accelerates at constant power: reaching ω takes t = ω_b / (2 α) + ω² / (2 α ω_b)
 (`timeline`), a straight line over ω². Its two constants need run-ups to two speeds. Where the axes hardly stand they did not

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How well a model of the control predicts what ten recorded parts took, from length over feed upwards.
+"""Measure how well a model of the control predicts what ten recorded parts took, from length over feed upwards.
 
     .venv/bin/python benchmarks/programs/time.py [--json]
 

@@ -1,4 +1,4 @@
-"""What all machines of a hall feel at once: each with its own strength, and a little later than its neighbour.
+"""Describe what all machines of a hall feel at once: each with its own strength, and a little later than its neighbour.
 
 | kind | what it does | a working day | lasts |
 |---|---|---|---|
@@ -25,7 +25,7 @@ OF_MACHINE, OF_EVENT = 0.35, 0.20
 
 
 class Kind(StrEnum):
-    """What disturbs the hall."""
+    """Holds what disturbs the hall."""
 
     FORKLIFT = "forklift"
     PRESS = "press"
@@ -36,7 +36,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Sort:
-    """How often a working day, how long, how strong in the unit of its effect, how much later the last machine feels it."""
+    """Says how often a working day, how long, how strong in the unit of its effect, how much later the last machine feels it."""
 
     a_day: float
     lasts_s: tuple[float, float]
@@ -91,7 +91,7 @@ def draw_disturbance(kind: Kind, start_s: float, lasts_s: float, stands: Floats,
 
 
 def course(disturbances: Sequence[Disturbance], kind: Kind, machine: int, ticks: int) -> Floats:
-    """What the machine feels of that kind at each second, (T,), in the unit of its strength."""
+    """Return what the machine feels of that kind at each second, (T,), in the unit of its strength."""
     felt, edge_s = np.zeros(ticks), SORTS[kind].edge_s
     for one in disturbances:
         if one.kind is kind:

@@ -1,4 +1,4 @@
-"""What breaks in one machine, and how big "1" is. These sizes were written down before anything was judged by them.
+"""Describe what breaks in one machine, and how big "1" is. These sizes were written down before anything was judged by them.
 
 | kind | size 1 | comes | lasts |
 |---|---|---|---|

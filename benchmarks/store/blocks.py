@@ -1,4 +1,5 @@
-"""What vibration costs: blocks of a second of three axes at 1 kHz, noise of some least significant bits, sealed; bytes a sample.
+"""Measure what vibration costs: blocks of a second of three axes at 1 kHz, noise of some least significant bits, sealed; bytes
+a sample.
 
 python -m benchmarks.store.blocks
 """

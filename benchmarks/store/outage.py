@@ -79,7 +79,7 @@ def folder_bytes(folder: Path) -> int:
 
 
 def differing(store: ServerStore, machines: int, count_s: int, t0_ms: int) -> tuple[int, int]:
-    """Of a tenth of the time: samples that were compared, and those that are wrong, missing or there twice."""
+    """Return, for a tenth of the time: samples that were compared, and those that are wrong, missing or there twice."""
     compared = wrong = 0
     span_s = max(count_s // 30, 1)
     for begin_s in (0, count_s // 2, count_s - span_s):
@@ -96,7 +96,7 @@ def differing(store: ServerStore, machines: int, count_s: int, t0_ms: int) -> tu
 
 
 def queries(store: ServerStore, count_s: int, t0_ms: int) -> str:
-    """How long three usual questions take, the median of nine."""
+    """Return how long three usual questions take, the median of nine."""
     three = tuple(f"axis_{s}_load_pct" for s in range(3))
     end_ms = t0_ms + count_s * 1000
     questions = {

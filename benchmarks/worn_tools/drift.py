@@ -5,7 +5,7 @@
 The machine is benchmarks/worn_tools/world.py; its meter drifts by 6 % within four weeks from day 60 on. The figures are the
 blocks of processors/tool_wear/drift.py, the same for all charts. river's ADWIN and PageHinkley are in the table where river is
 installed (it is no dependency), as it gives them and over a grid of thresholds: charts are compared in rows of the same rate of
-false alarms. No threshold is chosen on what is judged. Each alarm begins the chart anew; those of the blocks that are learned
+false alarms. No threshold is chosen on what is judged. Each alarm begins the chart again; those of the blocks that are learned
 count for none.
 """
 

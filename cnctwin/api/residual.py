@@ -56,7 +56,7 @@ class Models:
         from twin.residual.physics import Physics  # noqa: PLC0415  where there are models
 
         if not model.trained.physics.is_as(Physics.of(of.thermal.machine)):
-            return Correction(None, f"none: {model.version} corrects another heat of the spindle; train it anew")
+            return Correction(None, f"none: {model.version} corrects another heat of the spindle; train it again")
         if len(physics_c) > STEPS_MAX:
             return Correction(None, f"none: a course of {len(physics_c)} steps is longer than the {STEPS_MAX} that are corrected")
         from twin.residual.prediction import predict_correction  # noqa: PLC0415  with the extra that it needs

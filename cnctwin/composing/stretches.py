@@ -11,7 +11,7 @@ from itertools import pairwise
 from cnctwin.composing.history import COOLANT, RPM, TEMPERATURE, Between, History, Span
 
 REST_S, COOLING_S = 1200.0, 10_800.0
-"""Standstill after which a spindle begins anew, and as much of it as is worth keeping."""
+"""Standstill after which a spindle begins again, and as much of it as is worth keeping."""
 LEAD_S = 60.0
 SILENCE_S = 600.0
 """Nothing told for so long is a hole: a day off, a recorder that stood."""

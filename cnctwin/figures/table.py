@@ -1,7 +1,7 @@
 """Tables of production figures by machine, shift, part or program, out of the records of shifts and parts.
 
 A shift has its times from its own record and its parts from theirs, so that a quality that is told late is in. What a process
-that began anew in mid-shift did not see is unknown.
+that began again in mid-shift did not see is unknown.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -68,7 +68,7 @@ def table(shifts: Sequence[ShiftTold], parts: Sequence[PartTold], asked: Asked) 
 
 
 def _shift(told: Sequence[ShiftTold], parts: Sequence[PartTold], asked: Asked) -> Row:
-    """Return one shift. Several records of it are of processes that began anew: what one saw, another did not."""
+    """Return one shift. Several records of it are of processes that began again: what one saw, another did not."""
     planned_s = max(one.planned_s for one in told)
     times = {name: sum(getattr(one, name) for one in told) for name in (*ELEMENTS, "beside_s")}
     has_calendar = any(one.calendar for one in told)

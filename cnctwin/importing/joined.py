@@ -1,8 +1,8 @@
 """Several files that are one recording: placed one after another in time, with what held at the end of one carried into the next.
 
 Files with dates are placed by their dates, and what two of them have in common is taken from the earlier. Times that go on where
-the file before ended are taken as they are. Times that begin anew, without a date, say nothing of the gap: such a file is put one
-row after the one before, and the account says so.
+the file before ended are taken as they are. Times that begin again, without a date, say nothing of the gap: such a file is put
+one row after the one before, and the account says so.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -97,7 +97,7 @@ def _shift(part: Part, before: Before, remarks: list[str]) -> int:
     first_ns, is_absolute = int(part.first.t_ns[0]), part.first.is_absolute
     half_ns = before.begin_ns + (before.end_ns - before.begin_ns) // 2
     if is_absolute != before.is_absolute or (not is_absolute and first_ns + before.shift_ns <= half_ns):
-        why = "has a date and the file before has none" if is_absolute else f"begins anew at {first_ns / NS:g} s and has no date"
+        why = "has a date and the file before has none" if is_absolute else f"begins again at {first_ns / NS:g} s and has no date"
         step = f"one row ({before.step_ns / NS:g} s)"
         remarks.append(f"{part.name} {why}: it is put {step} after {before.name}; how long the gap was is not known")
         return before.end_ns + before.step_ns - first_ns

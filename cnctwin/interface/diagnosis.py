@@ -50,7 +50,7 @@ class Diagnosis:
 
     @property
     def where(self) -> tuple[Cell, ...]:
-        """Where the gap lies: signal and regime, largest share first."""
+        """Return where the gap lies: signal and regime, largest share first."""
         return self.answer.where
 
     @property

@@ -61,7 +61,7 @@ class Optimised:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of this answer."""
+        """Return what a person should know of this answer."""
         return self.answer.notes
 
     @property

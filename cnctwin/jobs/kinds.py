@@ -72,7 +72,7 @@ class OptimiseParameters(Parameters):
                 self.program_text.encode(self.encoding)
             except UnicodeEncodeError as error:
                 sign = self.program_text[error.start]
-                raise ValueError(f"program_text has the sign {sign!r}, which {self.encoding} has not got") from None
+                raise ValueError(f"program_text has the sign {sign!r}, which {self.encoding} does not have") from None
         return self
 
     def machine_of(self, files: FilesRoot) -> str:

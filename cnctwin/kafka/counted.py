@@ -21,7 +21,7 @@ class Counted:
         self._repeated = 0
 
     def retire(self, partition: Partition) -> None:
-        """Keep the counts of a partition that goes, or is restored anew; it has neither machines nor anything held back then."""
+        """Keep the counts of a partition that goes, or is restored again; it has neither machines nor anything held back then."""
         for name, counts in _of(partition):
             without_gauges(counts)
             self._gone.setdefault(name, Counter()).update(counts)

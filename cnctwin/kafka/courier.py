@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class Startable(Protocol):
-    """What is at work from `start` to `stop`, once."""
+    """Holds what is at work from `start` to `stop`, once."""
 
     def start(self) -> None: ...
 

@@ -13,7 +13,7 @@ def promotion(last: Last, zone: tzinfo | None = None, *, is_since: bool = True) 
     >>> from datetime import UTC
     >>> found = Last(says="coolant cools", signal="t", words="the temperature", before=3.1, after=1.1, since=1_795_521_780_000)
     >>> promotion(found, UTC)
-    'coolant cools: gap of the temperature 3.1 → 1.1 floors since Tuesday 12:03'
+    'coolant cools: gap of the temperature 3.1 → 1.1 × the repeatability since Tuesday 12:03'
     """
     since = datetime.fromtimestamp(last.since / 1000.0, zone).astimezone(zone)
     when = f" since {since:%A %H:%M}" if is_since else ""

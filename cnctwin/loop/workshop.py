@@ -178,7 +178,7 @@ class Workshop:
         return Work(doing=doing)
 
     def begin(self, machine: str, case: str) -> None:
-        """Have a case begun anew where it led to nothing before."""
+        """Have a case begun again where it led to nothing before."""
         Paths(self.places.files.resolve() / FOLDER / machine, case).failed.unlink(missing_ok=True)
         self._tries = {key: tries for key, tries in self._tries.items() if key[0] != case}
 

@@ -250,7 +250,7 @@ class StoreRecorder:
             try:
                 later = list(islice(self._store.messages(machine, from_ms, 1 << 62), REREAD_MAX))
             except StoreError as error:
-                _log.warning("%s: the numbers of its rows are begun anew: %s", machine, error)
+                _log.warning("%s: the numbers of its rows are begun again: %s", machine, error)
                 self._numbers.forget(machine)
             else:
                 self._numbers.note(later)

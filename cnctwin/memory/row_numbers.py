@@ -26,7 +26,7 @@ from sparkplug.topics import NodeId
 HOLE_S = 60.0
 HOLE_KEPT_MS = 7 * 86_400_000
 JUMP_MAX = 100_000_000
-"""Numbers further ahead are those of an edge whose store was damaged, and began anew."""
+"""Numbers further ahead are those of an edge whose store was damaged, and began again."""
 DEVICES_MAX = 1_000
 SPAN_LENGTH_MAX = 40
 SPANS_MAX, DUE_SPANS_MAX = 200, 10_000
@@ -64,7 +64,7 @@ class _Rows:
         if is_live:
             is_back = number < self.live and number not in self.have  # else it is read again, at a start
             if is_back or (self.live >= 0 and number - self.live > JUMP_MAX):
-                self.have, self.opened_ms, self.newest = Spans(), {}, -1  # the edge has begun to count anew
+                self.have, self.opened_ms, self.newest = Spans(), {}, -1  # the edge has begun to count again
             self.live = number
         if number > self.newest:
             if self.newest >= 0 and number > self.newest + 1:
@@ -185,7 +185,7 @@ class RowNumbers:
             return json.dumps({"noted_ms": self.noted_ms, "devices": devices}, separators=(",", ":")).encode()
 
     def restore(self, saved: bytes) -> None:
-        """Go on from what was saved; what cannot be read is begun anew."""
+        """Go on from what was saved; what cannot be read is begun again."""
         try:
             told: dict[str, Any] = json.loads(saved)
             rows = {
@@ -205,7 +205,7 @@ class RowNumbers:
             self._rows, self.noted_ms = rows, noted_ms
 
     def forget(self, machine: str) -> None:
-        """The numbers of a machine are begun anew."""
+        """The numbers of a machine are begun again."""
         with self._lock:
             self._rows = {key: rows for key, rows in self._rows.items() if key[1] != machine}
 

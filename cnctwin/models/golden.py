@@ -57,5 +57,5 @@ def golden_of(own: Shelf) -> tuple[RunLog, Mapping[str, Any]] | None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UsageError(f"{path}: cannot be read: {error}") from None
     if sha256 != told.get("sha256"):
-        raise UsageError(f"{data}: is not what was frozen (SHA-256 {sha256[:DIGITS]}…): it is no test any more; freeze one anew")
+        raise UsageError(f"{data}: is not what was frozen (SHA-256 {sha256[:DIGITS]}…): it is no test any more; freeze one again")
     return read_run(data), told

@@ -71,7 +71,7 @@ class Shelf:
         except FileNotFoundError:
             told = None
         except (OSError, UnicodeDecodeError, PointerError) as error:
-            raise UsageError(f"{error}; cnctwin model promote writes it anew") from None
+            raise UsageError(f"{error}; cnctwin model promote writes it again") from None
         link = self.folder / LINK
         linked = Path(os.readlink(link)).name if link.is_symlink() else None  # noqa: PTH115  its text, whatever is there
         if linked is None or (told is not None and told.champion == linked):

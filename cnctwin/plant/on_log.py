@@ -14,7 +14,7 @@ from twin.vocabulary.nodes import TWIN_NODE_PREFIX, is_twin_node
 WAITING_MANY = 10_000
 """Records of the bridge from here on are a backlog: 1 % of its room (1,000,000), and more than a second of a large plant."""
 REPEATED_SHARE = 0.1
-"""A bridge that begins anew repeats the little that was on its way; two that read the same nodes repeat all."""
+"""A bridge that begins again repeats the little that was on its way; two that read the same nodes repeat all."""
 _HEALTH = "health/"
 
 

@@ -1,4 +1,4 @@
-"""Who answers: a person (or what is piped in) at plain prompts, or nobody, where the answers are given already."""
+"""Describe who answers: a person (or what is piped in) at plain prompts, or nobody, where the answers are given already."""
 
 import getpass
 import sys

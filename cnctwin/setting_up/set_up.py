@@ -66,7 +66,7 @@ WantedBy=default.target
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What the command line gives; None = it is asked for."""
+    """Holds what the command line gives; None = it is asked for."""
 
     control: str | None = None
     device: str = ""

@@ -1,8 +1,8 @@
 """The nights that were judged, one line of JSON each in `<folder>/<machine>.jsonl`, and whether they call for retraining.
 
 Two nights in a row over the budget of the same figure call for it. A night without data for a figure breaks no row and makes
-none; a night within the budget ends one; a twin that was changed begins anew. A night that is judged again takes the place of the
-line that it had. The file holds the newest NIGHTS_MAX nights.
+none; a night within the budget ends one; a twin that was changed begins again. A night that is judged again takes the place of
+the line that it had. The file holds the newest NIGHTS_MAX nights.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The twin, computed anew from what a machine told: where the store has not got what it said, and over run logs.
+"""The twin, computed again from what a machine told: where the store does not have what it said, and over run logs.
 
 The physics is that of the live twin: the machine's description, with every effect of it; without one, the constants in the old
 tables [thermal] and [cutting_force] of the processors' configuration.

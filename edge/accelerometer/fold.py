@@ -1,7 +1,7 @@
 """The figures of blocks of acceleration: rms of each second in the band, and the blocks as they are published. A pure fold.
 
 Blocks are one stream while each has the number after the last one's and the same rate. A block that is lost, clipped, dead, or
-holds what no sensor measures breaks the stream: the values are null with the reason, the filters start anew, and the first half
+holds what no sensor measures breaks the stream: the values are null with the reason, the filters start again, and the first half
 second after that is not counted. A block that carries no time is stamped when it comes; the stamps of such blocks follow their
 rate and are drawn to the arrivals slowly, so that the network's jitter is not in them.
 """
@@ -32,7 +32,7 @@ SETTLE_CHUNKS = 5
 AT_FULL_SCALE = 0.999
 G_MAX = 100_000.0
 STEERED = 0.02  # of the difference between arrival and what the rate says, each block
-STEERED_US_MAX = 1_000_000.0  # a larger one starts anew
+STEERED_US_MAX = 1_000_000.0  # a larger one starts again
 NO_BLOCK = "no block from the accelerometer yet"
 
 
@@ -78,7 +78,7 @@ def step(section: AccelerometerSection, state: State, block: Block, arrival_us: 
     before, gaps, delivered = state.number, tuple[Gap, ...](), Delivery()
     if before is not None and block.number != before + 1:
         missing = max(block.number - before - 1, 0)
-        reason = "blocks of the accelerometer are lost" if missing else "the accelerometer's sender started anew"
+        reason = "blocks of the accelerometer are lost" if missing else "the accelerometer's sender started again"
         gaps = (Gap(reason, before + 1, max(block.number - 1, before), missing),)
     edge_us = _edge_us(state, block, arrival_us)
     stamp_us = edge_us if block.last_us is None else float(block.last_us)

@@ -8,7 +8,7 @@ of documents that come one way (a ClockReading with `edge_ms` 0; most within `ro
 one way too; and the signals themselves (`edge/clock/signals.py`), where a sensor of the edge sees the spindle. It is gathered for
 `BUCKET_S`, and windows of such buckets are put together.
 
-A clock was set (a step) when the last buckets agree with each other and not with those before; the windows start anew with them.
+A clock was set (a step) when the last buckets agree with each other and not with those before; the windows start again with them.
 What the edge's own clock was set by is seen against its monotonic clock, and taken off all bounds. Drift is a robust line
 (`edge/clock/drift.py`). A step, or a drift that has taken the offset past a second from where it began, is an alarm.
 
@@ -304,7 +304,7 @@ def _is_by_stamps(published: OffsetEstimate | None) -> bool:
 
 
 def _followed(state: State, judged: OffsetEstimate) -> State:
-    """The series for the drift, and where it began; of another clock than before both begin anew."""
+    """The series for the drift, and where it began; of another clock than before both begin again."""
     bound = judged.bound
     if bound is None:
         return state

@@ -1,6 +1,6 @@
-"""Many machines in one process: the edge of each configuration file, watched and taken up anew.
+"""Many machines in one process: the edge of each configuration file, watched and taken up again.
 
-    folder ──each second──► files ──► running edges: begun, ended, or begun anew with what the file says now
+    folder ──each second──► files ──► running edges: begun, ended, or begun again with what the file says now
 
 An edge that hangs, floods or crashes has its own connection, queue, store and session on the broker, so the others go on. One
 that ends by itself is begun again, later each time; a file that cannot be used changes nothing for the edge that runs. What two
@@ -154,7 +154,7 @@ class Gateway:
         if before is not None and before.config == config:
             return
         if before is not None:
-            _log.warning("%s: has changed; the edge of %s begins anew", file, config.machine.name)
+            _log.warning("%s: has changed; the edge of %s begins again", file, config.machine.name)
             self._end(file)
         self._edges[file] = _Edge(config)
 

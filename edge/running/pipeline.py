@@ -6,7 +6,7 @@ age of its values.
 
 What waits in the state machine for more evidence has left the control and is in no row yet. So its memory is stored with the
 rows, and an edge that was killed in the middle of a tool change goes on in the middle of it, where the control's server still has
-what came since; after a hole it begins anew.
+what came since; after a hole it begins again.
 """
 
 import logging
@@ -131,7 +131,7 @@ class Pipeline:
         return Outcome(tuple(rows_of(news)), +dropped)
 
     def _resume(self, before: Memory, frame: SampleSet, news: list[EdgeSample], dropped: Counter[Drop]) -> None:
-        """The edge has rejoined: it goes on where it was, or after a hole begins anew."""
+        """The edge has rejoined: it goes on where it was, or after a hole begins again."""
         self._before = None
         if frame.gaps:
             dropped[Drop.DEBOUNCED] += before.change.held

@@ -8,7 +8,8 @@ hours of that regime:
 A value further than 6 of its standard deviations from the standing mean counts as 6, so that a spike is a spike and a step is
 followed within minutes.
 
-Where a machine is described anew, its twin is another one: the standing figures and the charts begin anew, and so does the level
+Where a machine is described again, its twin is another one: the standing figures and the charts begin again, and so does the
+level
 that growth is judged from, learned from the next hours. What a healthy machine's samples scatter by is a property of machine and
 sensor, and stays: it is counted about the mean under each description.
 """
@@ -24,7 +25,7 @@ STRAYS_CUT_S = 60.0
 BLOCK_PART_MIN = 1.0 / 60.0
 """A block that has seen its regime for less than this part of its length is carried on into the next one."""
 ANEW_BLOCKS_MAX = 3 * BLOCKS_MIN
-"""A level that is learned anew is learned from no more blocks than this; a drift behind them is not taken for the twin."""
+"""A level that is learned again is learned from no more blocks than this; a drift behind them is not taken for the twin."""
 SPREAD_WORTH = math.log(1.5)
 """A scatter that has grown to 1.5 times what it was is worth an alarm."""
 

@@ -54,7 +54,7 @@ class Floor(NamedTuple):
 
 
 def begun(given: Given, state: State, at_s: float) -> State:
-    """Return the state with the start of the healthy period; where another one is configured now, all is learned anew."""
+    """Return the state with the start of the healthy period; where another one is configured now, all is learned again."""
     if given.config.healthy_from is None:
         return state if state.healthy_from_s is not None else replace(state, healthy_from_s=at_s)
     from_s = given.config.healthy_from.timestamp()
@@ -64,7 +64,7 @@ def begun(given: Given, state: State, at_s: float) -> State:
 
 
 def taken_up(given: Given, state: State, at_s: float) -> State:
-    """Return the state under the description that holds now: what its twin computes begins anew, what was learned stays."""
+    """Return the state under the description that holds now: what its twin computes begins again, what was learned stays."""
     version = given.twin.version
     if state.version == version:
         return state

@@ -70,7 +70,7 @@ def basis_of(expectations: Expectations, description: str) -> str:
     if not expectations:
         return "no expectation of the twin"
     stale = sorted({one.program for one in expectations.values() if description and one.description not in ("", description)})
-    old = f"; stale, since the machine is described anew: {_listed(stale)}: cnctwin expect makes them again" if stale else ""
+    old = f"; stale, since the machine is described again: {_listed(stale)}: cnctwin expect makes them again" if stale else ""
     return f"the twin expects {_listed(sorted({one.program for one in expectations.values()}))}{old}"
 
 

@@ -44,7 +44,7 @@ class InStep(NamedTuple):
     behind: int = 0
 
     def moved(self, before: int | None, tick: int) -> "InStep | None":
-        """Return who is in step after a machine has come from tick `before` to `tick`; None = that is to be found anew, since a
+        """Return who is in step after a machine has come from tick `before` to `tick`; None = that is to be found again, since a
         frame is complete, or the machine joins or leaves.
 
         >>> InStep(first=100, last=105, behind=2).moved(100, 101)

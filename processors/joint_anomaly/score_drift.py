@@ -2,7 +2,7 @@
 
 A threshold holds for machines that score as they did when it was fitted. Means over an hour of scores that were not gated are
 charted against those of the golden week, with the correlation of neighbouring hours in it; what goes up or down for good is
-drift: the model wants to be trained anew, or the machine has changed. A year of scores like those of the golden week brings
+drift: the model wants to be trained again, or the machine has changed. A year of scores like those of the golden week brings
 `FALSE_ALARMS_A_YEAR`.
 """
 

@@ -79,7 +79,7 @@ def read_scorings(config: Configuration[Config]) -> dict[str, Scoring]:
         if unknown := [name for name in model.features if name not in NUMBERS]:
             raise ValueError(f"the model of {machine} has the feature {unknown[0]!r}, which is no signal that is scored live")
         if shared.common_mode is Method.FEATURES and model.preparation is None:
-            raise ValueError(f"common_mode = features, but the model of {machine} was not trained for it: train it anew so")
+            raise ValueError(f"common_mode = features, but the model of {machine} was not trained for it: train it again so")
         if shared.common_mode is Method.PARTS:
             _check_parts(shared, machine, model)
         if model.calibration is not None and shared.threshold is None:
@@ -114,8 +114,8 @@ def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
 def _check_parts(config: Config, machine: str, model: "AnomalyModel") -> None:
     if model.parts is None:
         raise ValueError(
-            f"common_mode = parts, but the model of {machine} was not trained for it: train it anew, or set the common_mode that "
-            "it was trained for"
+            f"common_mode = parts, but the model of {machine} was not trained for it: train it again, or set the common_mode "
+            "that it was trained for"
         )
     if model.parts.tick_s != config.tick_s:
         raise ValueError(f"tick_s = {config.tick_s:g}, but the model of {machine} was trained with {model.parts.tick_s:g}")
@@ -127,6 +127,6 @@ def _check_settings(config: Config, machine: str, calibration: "Calibration") ->
         fitted, configured = getattr(calibration, key), getattr(config, key)
         if fitted != configured:
             raise ValueError(
-                f"{key} = {configured}, but the threshold of {machine} was fitted with {fitted}: configure that, fit anew, "
+                f"{key} = {configured}, but the threshold of {machine} was fitted with {fitted}: configure that, fit again, "
                 "or set threshold"
             )

@@ -48,7 +48,7 @@ class Descriptions:
     # What the broker says.
 
     def take(self, event: HostEvent, now_s: float) -> str | None:
-        """Take a message below cnctwin/description/; return the machine that is described anew, if one is."""
+        """Take a message below cnctwin/description/; return the machine that is described again, if one is."""
         key = machine_and_role(event.topic)
         if key is None:
             self._hear_fault(event)
@@ -134,8 +134,8 @@ class Descriptions:
         )
 
     def _compare(self) -> None:
-        """Publish what the broker has not got, as after a crash of it; take back a challenger that went while nobody looked, and
-        faults that are mended."""
+        """Publish what the broker does not have, as after a crash of it; take back a challenger that went while nobody looked,
+        and faults that are mended."""
         described = {machine for machine, _ in self._written}
         for key, payload in self._written.items():
             if key not in self._heard:

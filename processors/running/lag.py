@@ -9,7 +9,7 @@ in the socket or in the broker, and one edge that sends late does not: the other
 
 Many messages may wait when a process starts, so the first of a node says nothing of its least age. A clock that can be right,
 since its first message is less than a minute old, is taken to be right. A lag that stands still, while the process has time to
-spare, was a wrong clock, and is forgotten. The least age is learned anew where stamps go back: the clock was set. While the
+spare, was a wrong clock, and is forgotten. The least age is learned again where stamps go back: the clock was set. While the
 process is in time it creeps up, faster than clocks drift. What this cannot see: a delay that never changes, of edges whose clocks
 are more than a minute off, and one that hardly changes while the process has time to spare.
 """

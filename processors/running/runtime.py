@@ -43,7 +43,7 @@ def run(
 ) -> None:
     """Run processors whose configuration has been checked until `stop` is set. A processor that fails is restarted by itself
     (processors/running/containment.py); raises ProcessorsFailedError where all of them go on failing, so that a supervisor can
-    start the process anew.
+    start the process again.
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`

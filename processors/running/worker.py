@@ -264,7 +264,7 @@ class Worker:
             self._go_down("most machines", error, now_s)
 
     def _take_up(self, machines: Collection[str], now_s: float) -> None:
-        """Begin with machines anew, from the births that the host session remembers."""
+        """Begin with machines again, from the births that the host session remembers."""
         for event in self._host.births() if machines else ():
             if event.device in machines and self.listens_to(event.node.node):
                 self.take(event, now_s)

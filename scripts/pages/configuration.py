@@ -1,6 +1,7 @@
 """docs/reference/configuration.md: every key of every configuration, from the sample beside each typed model.
 
-Tests hold that a sample has every key of its model, at the model's default (tests/processors/test_contract.py, tests/edge/test_adapter_contract.py).
+Tests hold that a sample has every key of its model, at the model's default (tests/processors/test_contract.py,
+tests/edge/test_adapter_contract.py).
 """
 
 import re

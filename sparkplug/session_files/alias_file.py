@@ -1,6 +1,7 @@
 """The aliases of an edge node, kept over restarts, so that a metric has the same one in each birth of each life.
 
-No rule asks for it (6.4.7: a birth tells the aliases anew), but who has recorded data messages can then read them with any birth.
+No rule asks for it (6.4.7: a birth tells the aliases again), but who has recorded data messages can then read them with any
+birth.
 A row of the file is a line of JSON, device (null: the node's own) and name; its number is the alias. New rows are added at the
 end, so that a thousand devices cost a thousand times what one does. (Files written before are one list of all rows.)
 """

@@ -11,7 +11,7 @@ from sparkplug.transport.sendable import topic_fault
 
 PACKET_BYTES_MAX = 1024 * 1024  # a longer one is not held here until it is whole
 TOPICS_MAX = 20_000
-TOPIC_BYTES_KEPT = 1024  # a longer one is read anew each time
+TOPIC_BYTES_KEPT = 1024  # a longer one is read again each time
 REMAINING_LENGTH_MAX = 268_435_455
 MQTT_5 = 5
 SUCCESS = 0

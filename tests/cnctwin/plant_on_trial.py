@@ -82,7 +82,7 @@ class Plant:
                     self.mirror[event.topic] = json.loads(event.payload)
 
     def _unlike(self, ends: dict[str, object]) -> dict[str, tuple[object, object]]:
-        """What the mirror shows otherwise."""
+        """Return what the mirror shows otherwise."""
         shown = {topic: self.mirror.get(topic, {}).get("value") for topic in ends}
         return {topic: (shown[topic], value) for topic, value in ends.items() if shown[topic] != value}
 

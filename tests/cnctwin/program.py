@@ -20,7 +20,7 @@ def until(condition: Callable[[], bool], what: str, seconds: float = WAIT_S_MAX)
 
 
 def is_alive(pid: int) -> bool:
-    """Whether a process runs; one that is dead and not yet collected does not."""
+    """Return whether a process runs; one that is dead and not yet collected does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -64,12 +64,12 @@ class Program:
 
     @property
     def out(self) -> str:
-        """What it wrote to stdout."""
+        """Return what it wrote to stdout."""
         return (self._folder / "out").read_text()
 
     @property
     def err(self) -> str:
-        """What it wrote to stderr."""
+        """Return what it wrote to stderr."""
         return (self._folder / "err").read_text()
 
     def ask_to_end(self, number: int) -> int:

@@ -138,7 +138,7 @@ def target_schema(target: dict[str, Any]) -> Schema:
 
 
 def complaints(document: dict[str, Any]) -> list[str]:
-    """What is wrong with a dashboard; nothing = []."""
+    """Return what is wrong with a dashboard; nothing = []."""
     found = list(_complaints(document, of(dashboard.Dashboard), "dashboard"))
     for panel in document.get("panels", []):
         found += _of_panel(panel)

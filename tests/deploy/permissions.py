@@ -32,13 +32,13 @@ ELSEWHERE = (
 
 
 def said_by(node: str) -> frozenset[str]:
-    """What a node tells of itself and its device."""
+    """Return what a node tells of itself and its device."""
     own = {f"spBv1.0/cnc/{verb}/{node}" for verb in NODE_VERBS}
     return frozenset(own | {f"spBv1.0/cnc/{verb}/{node}/okuma" for verb in DEVICE_VERBS})
 
 
 def told(node: str) -> frozenset[str]:
-    """What a node and its device are commanded by."""
+    """Return what a node and its device are commanded by."""
     return frozenset({f"spBv1.0/cnc/NCMD/{node}", f"spBv1.0/cnc/DCMD/{node}/okuma"})
 
 

@@ -122,7 +122,7 @@ class Plant:
 
     @property
     def log(self) -> str:
-        """What the broker said."""
+        """Return what the broker said."""
         return (self.home / "log").read_text(errors="replace")
 
     def with_certificate(self, name: str, listener: int = EDGES, authority: Path | None = None) -> BrokerAddress:

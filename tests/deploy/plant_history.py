@@ -39,7 +39,7 @@ TOOL_CHANGE_S = (200, 206)
 
 
 def fast(second: int) -> float:
-    """What a fast signal is at a moment."""
+    """Return what a fast signal is at a moment."""
     return 50.0 + 20.0 * math.sin(second / 7.0)
 
 
@@ -103,7 +103,7 @@ COUNTERS = (
 
 
 def exposition(end_ms: int) -> str:
-    """What a scrape every 15 s of /metrics has brought, in Prometheus' form with times."""
+    """Return what a scrape every 15 s of /metrics has brought, in Prometheus' form with times."""
     validation = {
         f'{name}{{machine="okuma",quantity="{quantity}",measure="{measure}"}}': value
         for name, value in (("twin_validation", 0.9), ("twin_validation_budget", 2.0))

@@ -69,7 +69,7 @@ class Prepared(Plant):
 
     @property
     def environment(self) -> dict[str, str]:
-        """What `docker compose --env-file` reads."""
+        """Return what `docker compose --env-file` reads."""
         lines = [line for line in (self.home / ".env").read_text().splitlines() if line and not line.startswith("#")]
         return dict(line.split("=", 1) for line in lines)
 
@@ -122,7 +122,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory, mosquitto_program: str) -
 
 
 def is_over(job: dict[str, Any]) -> bool:
-    """Whether nothing more becomes of it."""
+    """Return whether nothing more becomes of it."""
     return job["state"] not in {"queued", "running"}
 
 
@@ -135,7 +135,7 @@ def command(service: dict[str, Any]) -> list[str]:
 
 
 def mounts(service: dict[str, Any], prepared: Prepared) -> list[tuple[Path, str]]:
-    """What of the host lies where in the container."""
+    """Return what of the host lies where in the container."""
     return [
         ((FOLDER / source).resolve() if source.startswith(".") else Path(source), inside)
         for source, inside in (prepared.put_in(volume).split(":")[:2] for volume in service.get("volumes", []))

@@ -117,7 +117,7 @@ def asked_of_influxdb(server: QueryClient, query: str, machine: str = MACHINES[0
 
 
 def points(series: dict[str, Any]) -> list[Any]:
-    """What is drawn of a series of either server."""
+    """Return what is drawn of a series of either server."""
     return [point for point in series["values"] if point[1] is not None]
 
 

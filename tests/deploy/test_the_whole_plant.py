@@ -61,7 +61,7 @@ def says(edge: EdgeNode, spindle_rpm: float) -> bool:
 
 
 def mirrored(viewer: WireClient) -> list[float]:
-    """What the viewer has seen of the spindle."""
+    """Return what the viewer has seen of the spindle."""
     return [json.loads(said)["value"] for topic, said in viewer.received if topic == "cnc/okuma/spindle_rpm"]
 
 

@@ -19,7 +19,7 @@ SHARING = ("cnctwin-historian", "cnctwin-jobs", "cnctwin-loop", "cnctwin-page", 
 
 
 def words(unit: Path) -> list[str]:
-    """What the unit starts."""
+    """Return what the unit starts."""
     line = re.search(r"^ExecStart=/opt/cnctwin/bin/cnctwin (.*)$", unit.read_text(), re.M)
     assert line, unit
     return shlex.split(line[1].replace("%i", "okuma").replace("%d", "/run/credentials/x").replace("%S", "/var/lib"))

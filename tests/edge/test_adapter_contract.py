@@ -57,7 +57,7 @@ def played(adapter: Adapter, frames: Sequence[bytes]) -> list[tuple[Any, SampleS
 
 
 def plain(given_: SampleSet) -> dict[str, object]:
-    """What a frame gave, as JSON."""
+    """Return what a frame gave, as JSON."""
     samples = [[s.signal, s.value, s.timestamp_ms, s.quality.name, s.reason] for s in given_.samples]
     gaps = [[gap.reason, gap.first_sequence, gap.last_sequence, gap.lost] for gap in given_.gaps]
     return {"samples": samples, "gaps": gaps, "dropped": {str(k): n for k, n in given_.dropped.items()}, "error": given_.error}

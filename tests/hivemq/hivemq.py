@@ -52,7 +52,7 @@ class HiveMQ:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where clients connect that bring nothing."""
+        """Return where clients connect that bring nothing."""
         return ("127.0.0.1", self.port)
 
     def __enter__(self) -> HiveMQ:

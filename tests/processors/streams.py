@@ -76,7 +76,7 @@ def fed(engine: Engine, *events: HostEvent, wall_s: float = 0.0) -> list[Action]
 
 
 def published(actions: list[Action]) -> list[tuple[int, str, Any, bool]]:
-    """What was published: (ms after the start, name, value, is_historical)."""
+    """Return what was published: (ms after the start, name, value, is_historical)."""
     return [
         (change.timestamp_ms - T0_MS, change.name, change.value, change.is_historical)
         for action in actions

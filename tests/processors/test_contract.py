@@ -181,7 +181,7 @@ def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProces
 
 
 def _without_births(snapshot: bytes) -> Any:
-    """Whose births a process has heard is of its own life."""
+    """Return whose births a process has heard is of its own life."""
     document = json.loads(snapshot)
     for lane in document["live"]["machines"].values():
         del lane["births"]

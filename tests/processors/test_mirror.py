@@ -19,7 +19,7 @@ THERMAL = NodeId("cnc", "twin-thermal")
 
 
 def mirror(*events: Any) -> dict[str, dict[str, Any]]:
-    """What the retained topics hold after these events."""
+    """Return what the retained topics hold after these events."""
     return {topic: json.loads(payload) for topic, payload in plain(fed(engine_of(PROCESSOR), *events)).items()}
 
 

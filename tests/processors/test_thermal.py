@@ -28,7 +28,7 @@ def heat_w(rpm: float, load_pct: float) -> float:
 
 
 def last(engine: Engine) -> dict[str, Change]:
-    """What a reader knows by now."""
+    """Return what a reader knows by now."""
     return engine._machines["okuma"].live.emission.latest
 
 

@@ -50,12 +50,12 @@ def start(at_s: float = 0.0, rate_hz: float | None = RATE_HZ) -> HostEvent:
 
 
 def last(engine: Engine) -> dict[str, Change]:
-    """What a reader knows by now."""
+    """Return what a reader knows by now."""
     return engine._machines["okuma"].live.emission.latest
 
 
 def shown(actions: list[Action], name: str) -> list[Change]:
-    """What was published of one output."""
+    """Return what was published of one output."""
     return [c for action in actions if isinstance(action, Publish) for c in action.changes if c.name == name]
 
 

@@ -52,7 +52,7 @@ class Edge:
 
     @property
     def connected(self) -> bool:
-        """Whether the broker and the node hold a connection."""
+        """Return whether the broker and the node hold a connection."""
         return self.will is not None
 
 

@@ -184,7 +184,7 @@ def test_any_type_with_any_field_raises_nothing_but_payload_error(where: str) ->
 
 
 def _place(message: Any, where: str, code: int) -> Any:
-    """Where a value of type `code` can stand in a payload."""
+    """Return where a value of type `code` can stand in a payload."""
     metric = message.metrics.add(name="a", datatype=code)
     if where == "metric":
         return metric

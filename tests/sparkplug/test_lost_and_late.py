@@ -37,7 +37,7 @@ def edge(world: World) -> Edge:
 
 
 def picture(world: World) -> NodePicture:
-    """What the host knows of the node."""
+    """Return what the host knows of the node."""
     known = world.host.picture(world.edges[0].node)
     assert known is not None
     return known

@@ -97,7 +97,7 @@ def encoder() -> Iterator[NodeProcess]:
 
 
 def peer_decodes(decoder: NodeProcess, payload: Payload) -> Any:
-    """What the peer makes of our bytes."""
+    """Return what the peer makes of our bytes."""
     return decoder.ask(encode(payload).hex())
 
 

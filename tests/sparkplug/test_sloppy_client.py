@@ -53,14 +53,14 @@ class Listening:
 
     @property
     def picture(self) -> NodePicture:
-        """What is known of the node."""
+        """Return what is known of the node."""
         picture = self.application.picture(NODE)
         assert picture is not None
         return picture
 
     @property
     def born(self) -> bool:
-        """Whether node and device are."""
+        """Return whether node and device are."""
         picture = self.application.picture(NODE)
         return picture is not None and picture.online and "lathe" in picture.devices and picture.devices["lathe"].online
 

@@ -198,7 +198,7 @@ class World:
     def delay(self, index: int, later_by: int) -> None:
         """A message is overtaken by those behind it; only no NDEATH overtakes the NBIRTH of its own session.
 
-        No host could tell the NBIRTH that comes after it from that of a node which was started anew.
+        No host could tell the NBIRTH that comes after it from that of a node which was started again.
         """
         flying = self.flight.pop(index)
         place = min(index + later_by, len(self.flight))
@@ -258,7 +258,7 @@ class World:
         edge.specs[device] = specs
 
     def _first(self, spec: MetricSpec) -> Known:
-        """What is true of a metric that was only declared: without a value it is not good."""
+        """Return what is true of a metric that was only declared: without a value it is not good."""
         return Known(spec.value, self.now_ms, Quality.BAD if spec.value is None else Quality.GOOD)
 
     def _do_edge(self, edge: Edge, actions: list[Action]) -> None:

@@ -52,8 +52,8 @@ def test_the_force_of_an_ampere_comes_from_the_screw_or_is_stated() -> None:
     [
         ("", "machine is missing"),
         ("[machine", "is not TOML"),
-        (HEAD + "[spindle]\nrated_power_kw = -1.0\nefficiency = 0.9", "spindle.rated_power_kw = -1.0: should be greater than 0"),
-        (HEAD + "[spindle]\nrated_power_kw = 1.0\nefficiency = 90.0", "spindle.efficiency = 90.0: should be less"),
+        (HEAD + "[spindle]\nrated_power_kw = -1.0\nefficiency = 0.9", "spindle.rated_power_kw = -1.0: must be above 0"),
+        (HEAD + "[spindle]\nrated_power_kw = 1.0\nefficiency = 90.0", "spindle.efficiency = 90.0: must be 1 or less"),
         (WHOLE.replace("mass_kg = 320.0", "mass_kg = nan"), "axes.x.mass_kg"),
         (
             HEAD + "[spindle]\nrated_power_kw = 9.0\nefficiency = 0.9\nidle_power_w = 300.0",

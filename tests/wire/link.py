@@ -38,7 +38,7 @@ class Link:
 
     @property
     def wants_more(self) -> bool:
-        """Whether the source is read: not past its end, nor for a target that is gone or has too much to take already."""
+        """Return whether the source is read: not past its end, nor for a target that is gone or has too much to take already."""
         return not self.ended and not self._target_is_gone and self._queued < BUFFER_BYTES_MAX
 
     @property
@@ -64,7 +64,7 @@ class Link:
         return pieces if self._is_mqtt else [*pieces, *self.rest()]
 
     def rest(self) -> list[Piece]:
-        """What is held back: the beginning of a packet that will never be whole."""
+        """Return what is held back: the beginning of a packet that will never be whole."""
         return [Piece(None, self._release(len(self._held)))] if self._held else []
 
     def _release(self, count: int) -> bytes:

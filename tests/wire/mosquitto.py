@@ -68,12 +68,12 @@ class Mosquitto:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where clients connect."""
+        """Return where clients connect."""
         return ("127.0.0.1", self.port)
 
     @property
     def log(self) -> str:
-        """What the broker said since the test began."""
+        """Return what the broker said since the test began."""
         return (self._home / "log").read_text(errors="replace")
 
     @property

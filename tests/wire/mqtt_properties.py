@@ -55,7 +55,7 @@ class Cursor:
 
     @property
     def left(self) -> int:
-        """How many bytes are still to come."""
+        """Return how many bytes are still to come."""
         return len(self._data) - self._at
 
     def take(self, count: int) -> bytes:

@@ -51,7 +51,8 @@ class Connection:
         self.close_at_s: float | None = None
 
     def is_over(self) -> bool:
-        """Whether both sides have ended; the second one gets some time, since closing on unread bytes would reset the first."""
+        """Return whether both sides have ended; the second one gets some time, since closing on unread bytes would reset the
+        first."""
         for link in self.links:
             if link.ended and link.due_s is None and self.close_at_s is None:
                 self.close_at_s = time.monotonic() + CLOSING_S_MAX
@@ -111,12 +112,12 @@ class Proxy(Recording):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where clients connect."""
+        """Return where clients connect."""
         return ("127.0.0.1", self.port)
 
     @property
     def connections(self) -> int:
-        """How many connections came in so far."""
+        """Return how many connections came in so far."""
         return self._accepted
 
     def cut(self) -> None:
@@ -291,7 +292,7 @@ class Proxy(Recording):
                 return
 
     def _passed(self, direction: Direction, packet: Packet | None, piece: bytes) -> int | None:
-        """How many bytes of a piece go on before a rule cuts the connection; None where no rule does."""
+        """Return how many bytes of a piece go on before a rule cuts the connection; None where no rule does."""
         for index, rule in enumerate(self._rules):
             if packet is not None and rule.direction == direction and rule.matches(packet):
                 if rule.nth > 1:

@@ -147,14 +147,14 @@ def load_model(folder: Path) -> AnomalyModel:
         raise ModelError(text if text.startswith(str(folder)) else f"{folder}: {text}") from None
     prepared = manifest.features if manifest.preparation is None else manifest.preparation.signals
     if width != len(manifest.features) or prepared != manifest.features:
-        raise ModelError(f"{folder}: {MANIFEST} names {len(manifest.features)} features, the arrays have {width}: train anew")
+        raise ModelError(f"{folder}: {MANIFEST} names {len(manifest.features)} features, the arrays have {width}: train again")
     return AnomalyModel(manifest.features, scorer, manifest.trained, manifest.calibration, manifest.preparation)
 
 
 def _of_parts(folder: Path, manifest: Manifest) -> AnomalyModel:
     model = read_parts(folder / PARTS, manifest.arrays_sha256)
     if model.signals != manifest.features:
-        raise ModelError(f"{folder}: {MANIFEST} names {manifest.features}, {PARTS} has {model.signals}: train anew")
+        raise ModelError(f"{folder}: {MANIFEST} names {manifest.features}, {PARTS} has {model.signals}: train again")
     return AnomalyModel(manifest.features, PartsScorer(model), manifest.trained, manifest.calibration)
 
 

@@ -62,4 +62,4 @@ def read_parts(path: Path, sha256: str) -> PartsModel:
         return PartsModel.model_validate_json(data)
     except ValidationError as error:
         first = error.errors()[0]
-        raise ModelError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}: train it anew") from None
+        raise ModelError(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}: train it again") from None

@@ -113,7 +113,7 @@ def fitted(name: str, parameters: Mapping[str, Any], seed: int, rows: Floats) ->
 
 
 def again(about: Refit, arrays: Mapping[str, NDArray[Any]]) -> RefitScorer:
-    """The detector trained anew on the rows in its file. Raises ModelError where it does not score the kept rows as it did."""
+    """The detector trained again on the rows in its file. Raises ModelError where it does not score the kept rows as it did."""
     missing = {"training_rows", "probe_rows", "probe_scores"} - set(arrays)
     if missing or about.name not in KINDS:
         raise ModelError(f"no detector {about.name!r} can be trained from {', '.join(arrays) or 'no arrays'}")
@@ -123,7 +123,7 @@ def again(about: Refit, arrays: Mapping[str, NDArray[Any]]) -> RefitScorer:
     if not (off <= TOLERANCE * (1.0 + np.abs(arrays["probe_scores"]))).all():
         raise ModelError(
             f"{about.name} of PyOD {versions()['pyod']}, trained again, scores the kept rows otherwise, by {off.max():.2g}: "
-            "use the versions in the manifest, or train anew"
+            "use the versions in the manifest, or train again"
         )
     return scorer
 

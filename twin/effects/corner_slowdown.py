@@ -13,12 +13,12 @@ from twin.sites import Site
 
 
 def feed_acceleration_mm_s2(stated_mm_s2: float, acceleration_mm_s2: float) -> float:
-    """Of the axes in cutting feed: the lower one."""
+    """Return the acceleration of the axes in cutting feed: the lower one."""
     return min(stated_mm_s2, acceleration_mm_s2)
 
 
 def rapid_acceleration_mm_s2(stated_mm_s2: float, rapid_mm_s2: float) -> float:
-    """Of the axes in rapid: the lower one."""
+    """Return the acceleration of the axes in rapid: the lower one."""
     return min(stated_mm_s2, rapid_mm_s2)
 
 
@@ -28,7 +28,7 @@ def across_acceleration_mm_s2(stated_mm_s2: float, acceleration_mm_s2: float, ac
 
 
 def corner_speed_difference_mm_min(stated_mm_min: float, corner_mm_min: float) -> float:
-    """Of each axis at a corner: the lower one."""
+    """Return the difference that each axis may make at a corner: the lower one."""
     return min(stated_mm_min, corner_mm_min)
 
 

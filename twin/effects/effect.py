@@ -197,7 +197,7 @@ class Effect:
     def checked(self, values: Mapping[str, float]) -> dict[str, float]:
         """All parameters, those not given at their typical value where they have no null value, else at null.
 
-        Raises EffectError naming a parameter that this effect has not got, or a value that is no finite number within its
+        Raises EffectError naming a parameter that this effect does not have, or a value that is no finite number within its
         bounds (infinity is a value where it is the null one).
         """
         known = {p.name: p for p in self.parameters}

@@ -10,12 +10,12 @@ from twin.sites import Site
 
 
 def feed_ratio(stated: float, ratio: float) -> float:
-    """Of the programmed feed."""
+    """Return the share of the programmed feed."""
     return stated * ratio
 
 
 def rapid_ratio(stated: float, rapid: float) -> float:
-    """Of the rapid rate."""
+    """Return the share of the rapid rate."""
     return stated * rapid
 
 

@@ -93,7 +93,7 @@ def read_manifest(folder: Path, kind: str, version: int) -> dict[str, Any]:
         found = manifest.get("kind") if isinstance(manifest, dict) else None
         raise ForestError(f"{path}: kind is {found!r}; it has to be {kind!r}")
     if manifest.get("version") != version:
-        raise ForestError(f"{path}: version {manifest.get('version')!r} of the format; this cnctwin reads {version}: train anew")
+        raise ForestError(f"{path}: version {manifest.get('version')!r} of the format; this cnctwin reads {version}: train again")
     return manifest
 
 

@@ -1,4 +1,5 @@
-"""What the columns of a recording say of each other, and where that can't be: another unit, another sign, a cut that isn't known.
+"""Describe what the columns of a recording say of each other, and where that can't be: another unit, another sign, a cut that
+isn't known.
 
 A column that cannot be what its name says is left out, and so is what depends on it: a force of the cut that nobody knows would
 else be blamed on the axes that it pushes and the meter that shows it.
@@ -66,7 +67,7 @@ def _off(slope: float) -> bool:
 
 
 def _slope(reference: Floats, values: Floats) -> float:
-    """Of values over the reference; NaN where it does not move, or the values do something else."""
+    """Return the slope of values over the reference; NaN where it does not move, or the values do something else."""
     known = np.isfinite(reference) & np.isfinite(values)
     if known.sum() < 100 or np.ptp(reference[known]) < 1e-9:
         return float("nan")
@@ -103,7 +104,7 @@ def with_known_cut(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
 
 
 def _around(here: NDArray[np.bool_], t_s: Floats) -> NDArray[np.bool_]:
-    """What is so within SHOWN_S before or after: a meter shows the mean of what was."""
+    """Return what is so within SHOWN_S before or after: a meter shows the mean of what was."""
     width = round(SHOWN_S / max(float(np.median(np.diff(t_s))), 1e-9))
     return np.asarray(np.convolve(here, np.ones(2 * width + 1), mode="same")[: len(here)] > 0.5)
 

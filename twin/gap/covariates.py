@@ -52,30 +52,30 @@ class Covariates:
 
     @property
     def known(self) -> Bools:
-        """Where there is a gap, (n,)."""
+        """Return where there is a gap, (n,)."""
         return np.isfinite(self.in_floors)
 
     @property
     def energy(self) -> float:
-        """Of the gap, in floors²."""
+        """Return the energy of the gap, in floors²."""
         return float(np.nansum(self.in_floors**2))
 
     @property
     def resting(self) -> Bools:
-        """Where the axis stands still, (n,): what its gap is there is chance, one for each time that it comes to rest."""
+        """Return where the axis stands still, (n,): what its gap is there is chance, one for each time that it comes to rest."""
         return self.within(Regime.REST.title)
 
     def within(self, *regimes: str) -> Bools:
-        """Where the signal is in one of these regimes, (n,)."""
+        """Return where the signal is in one of these regimes, (n,)."""
         return np.isin(self.regime_code, [i for i, name in enumerate(self.regimes) if name in regimes])
 
     def pieces(self, cell: Bools) -> float:
-        """What the samples of a cell (n,) are worth at most."""
+        """Return what the samples of a cell (n,) are worth at most."""
         still = cell & self.resting
         return float(np.sum(cell & ~still) + len(np.unique(self.stretch[still])))
 
     def constant_speed(self) -> Bools:
-        """Where the axis keeps its speed, (n,)."""
+        """Return where the axis keeps its speed, (n,)."""
         return self.within(Regime.CONSTANT_MINUS.title, Regime.CONSTANT_PLUS.title, "rapid")
 
     def without_means(self, values: Floats, by: NDArray[np.generic], where: Bools) -> Floats:
@@ -90,7 +90,7 @@ class Covariates:
 
 
 def covariates(traces: Sequence[Trace], logs: Mapping[str, RunLog], machine: MachineFile, after: bool) -> Covariates:
-    """What the gap of one signal may go with; traces: all of that signal, logs: run → what it recorded."""
+    """Return what the gap of one signal may go with; traces: all of that signal, logs: run → what it recorded."""
     rows = [_of_run(trace, logs[trace.run], machine) for trace in traces]
     gap = np.concatenate([gap_of(trace, after) for trace in traces])
     floor = np.concatenate([trace.floor for trace in traces])

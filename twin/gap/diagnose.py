@@ -184,7 +184,7 @@ def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
 
 
 def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: frozenset[Effected]) -> float:
-    """What the twin with some of the causes closes of the gap of the one with none."""
+    """Return what the twin with some of the causes closes of the gap of the one with none."""
     causes = dict(found_effects(stages))
     if not some:
         return 0.0

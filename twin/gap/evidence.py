@@ -23,7 +23,7 @@ TOLD_LEAST = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Advantage:
-    """Of one hypothesis over another.
+    """The advantage of one hypothesis over another.
 
     gain: T; error: its standard error; closes: largest decrease of a signal's mean square, in floors²
     share: of the gap above the floor that is gone, in the signal where most is; told: T over its standard error without what is
@@ -43,7 +43,7 @@ class Advantage:
 
 
 def advantage(one: Left, other: Left) -> Advantage:
-    """Of `other` over `one`; over the blocks that both have."""
+    """Return the advantage of `other` over `one`; over the blocks that both have."""
     there = one.counts.sum(axis=0) > 0
     if not there.any():
         return Advantage(0.0, 1.0, 0.0, 0.0)

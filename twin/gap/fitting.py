@@ -20,7 +20,7 @@ STEPS_WITHOUT = 14
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Left:
-    """What a fitted hypothesis leaves on the runs that judge it, in floors.
+    """Holds what a fitted hypothesis leaves on the runs that judge it, in floors.
 
     squares: (blocks, signals) sums of the squared residual over floor²; counts: (blocks, signals) samples
     cells: (signals, regimes) sums of the squared residual over floor²; cell_counts: (signals, regimes) samples
@@ -43,7 +43,7 @@ class Left:
         return np.asarray(np.sqrt(squares / np.maximum(counts, 1.0)))
 
     def gap(self) -> float:
-        """Of all signals: rms over the floor, each signal counted alike."""
+        """Return the gap of all signals: rms over the floor, each signal counted alike."""
         there = self.counts.sum(axis=0) > 0
         return float(np.sqrt(np.mean(self.rms()[there] ** 2))) if there.any() else 0.0
 
@@ -85,7 +85,8 @@ class Fitted:
 
 
 def left_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> Left:
-    """What the hypothesis at θ leaves on the runs that are fitted, or on the others; where there are none, on the fitted."""
+    """Return what the hypothesis at θ leaves on the runs that are fitted, or on the others; where there are none, on the
+    fitted."""
     return lefts_by(stage, model, theta[None, :], fitted=fitted)[0]
 
 

@@ -169,7 +169,7 @@ def _cleaned(run: Run, notes: list[str]) -> RunLog:
 
 
 def _missing(values: Floats) -> int:
-    """Samples that a signal has not got, beside those that its own slower rate leaves out."""
+    """Samples that a signal does not have, beside those that its own slower rate leaves out."""
     there = np.flatnonzero(np.isfinite(values))
     if len(there) < 3:
         return 0

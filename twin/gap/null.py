@@ -1,4 +1,4 @@
-"""What healthy machines show: how far a candidate seems to help where there is nothing to find.
+"""Describe what healthy machines show: how far a candidate seems to help where there is nothing to find.
 
 Calibrated with the blind check's plant on healthy machines of other programs and other seeds than those it is judged on.
 """
@@ -38,7 +38,7 @@ class Null:
     rms_typical: float = 1.1
 
     def exceeded(self, effected: Effected, over: Advantage, healthy_rms: float = SMOOTH) -> bool:
-        """Whether a candidate helps more than it does on any healthy machine.
+        """Return whether a candidate helps more than it does on any healthy machine.
 
         healthy_rms: what a healthy twin leaves in this stage at worst, in floors; where that is much, much has to be taken away
         """
@@ -55,7 +55,7 @@ class Null:
         return surely and over.closes > closes * rough and over.share > self.share_least
 
     def p_value(self, over: Advantage) -> float:
-        """Of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""
+        """Return the probability of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""
         return float(0.5 * erfc(over.sigmas / self.sigmas_spread / sqrt(2.0)))
 
 

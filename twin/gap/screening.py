@@ -89,7 +89,7 @@ class Guess:
 
 
 def guesses(stage: Stage, parent: Fitted, effected: Effected, left: Unexplained) -> tuple[Guess, ...]:
-    """Where to start the parameters of an effect, best first.
+    """Return where to start the parameters of an effect, best first.
 
     Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; angles by a
     pair of signatures a quarter of a turn apart; shapes, and what is infinite where there is no effect, over a grid. A size that

@@ -33,7 +33,8 @@ def judged(explained: Explained) -> Judged:
 
 
 def overall(stages: list[Judged]) -> Verdict:
-    """Of the machine: unknown where nothing could be named, partly explained where something could and something could not."""
+    """Return the verdict of the machine: unknown where nothing could be named, partly explained where something could and
+    something could not."""
     verdicts = {s.verdict for s in stages}
     if verdicts <= {Verdict.HEALTHY}:
         return Verdict.HEALTHY

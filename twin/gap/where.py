@@ -1,4 +1,4 @@
-"""Where the gap lies: every signal in every regime, beside what repeats.
+"""Describe where the gap lies: every signal in every regime, beside what repeats.
 
 A cell is one signal in one regime over all runs that are looked at. With ρ = (twin − recording) / floor, its share of the gap is
 
@@ -94,7 +94,8 @@ def _signal(name: str, traces: tuple[Trace, ...], after: bool) -> _Signal:
 
 
 def _pieces(regime: str, cell: NDArray[np.bool_]) -> float:
-    """What the samples of a regime are worth at most: where an axis comes to rest is one chance for each time that it does."""
+    """Return what the samples of a regime are worth at most: where an axis comes to rest is one chance for each time that it
+    does."""
     return float(np.sum(np.diff(cell.astype(np.int8), prepend=0) == 1)) if regime == Regime.REST.title else np.inf
 
 

@@ -1,6 +1,6 @@
 """Spindle temperature over a run: exact steps from sample to sample, however irregular, inputs held in between.
 
-A sample that an input has not got is the last one that it had, so signals of several rates fit together.
+A sample that an input does not have is the last one that it had, so signals of several rates fit together.
 """
 
 from collections.abc import Mapping, Sequence

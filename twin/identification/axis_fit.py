@@ -1,6 +1,6 @@
 """Identifies an axis: the closed loop is simulated from the reference alone, and its constants are fitted to position and torque.
 
-Fitting the loop, not the force balance, needs no acceleration, which a recording has not got; the start is the stated machine,
+Fitting the loop, not the force balance, needs no acceleration, which a recording does not have; the start is the stated machine,
 whose constants are a few percent off. The noise is that of each signal by regime: at rest, sticking makes the torque repeat
 worse than its sensor, so those samples count less.
 """
@@ -58,7 +58,7 @@ def stretches(recording: AxisRecording) -> tuple[AxisRecording, ...]:
 
     While an axis sticks, its integrator creeps on an error of tenths of a micrometre, so the torque from which it breaks away
     after a long rest is chance. Fitted through, that chance would be taken for friction; each stretch therefore starts from the
-    torque that was measured (multiple shooting: Bock 1981; for servo axes, Janot, Gautier, Brunot 2019 start each lap anew).
+    torque that was measured (multiple shooting: Bock 1981; for servo axes, Janot, Gautier, Brunot 2019 start each lap again).
     """
     return tuple(recording.cut(where) for where in motion_stretches(recording.t_s, recording.reference_mm))
 

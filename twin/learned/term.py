@@ -44,7 +44,7 @@ class Term:
         for column in self.knots.columns:
             if column not in arguments:
                 on = f" on {self.on}" if self.on else ""
-                raise EffectError(f"the learned term at {self.site.value}{on} needs {column}, which this run has not got there")
+                raise EffectError(f"the learned term at {self.site.value}{on} needs {column}, which this run does not have there")
         shape = np.shape(arguments[self.knots.columns[0]])
         flat = {column: np.ravel(arguments[column]) for column in self.knots.columns}
         return np.asarray(self.knots.interpolated(self.value[None, :], flat)[0].reshape(shape))

@@ -130,7 +130,7 @@ class LiveHeat:
     def continued(self, state: HeatState, told: HeatInput) -> HeatState:
         """Return the state that another description left behind, as this one goes on from it: its heat does not jump.
 
-        A state that this one has not got is forgotten, one that is new starts as declared; a sensor starts settled.
+        A state that this one does not have is forgotten, one that is new starts as declared; a sensor starts settled.
         """
         before = dict(zip(state.names, state.effects, strict=True))
         new = self.stepper.start({_TEMPERATURE: state.temperature_c, **told._asdict()})

@@ -79,7 +79,7 @@ def _places(
 def moving_average(values: Floats, window: int) -> Floats:
     """Mean (n, axes) of each value and the `window` − 1 before it; before the first one it stood there.
 
-    It is summed anew at each tick from the differences to the newest value, so that a value at rest comes out bit by bit as it
+    It is summed again at each tick from the differences to the newest value, so that a value at rest comes out bit by bit as it
     is.
     """
     n, axes = values.shape

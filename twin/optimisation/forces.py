@@ -149,7 +149,7 @@ def process_constants(machine: MachineFile) -> dict[str, float]:
 
 
 def constant_name(path: str) -> tuple[str, str]:
-    """Whose constant of the cut a path of [uncertainty] names (of all tools: empty), and which.
+    """Return whose constant of the cut a path of [uncertainty] names (of all tools: empty), and which.
 
     >>> constant_name("tools.7.radial_ratio"), constant_name("effects.edge_force.radial_n_per_mm")
     (('tools.7', 'radial_ratio'), ('', 'edge_force__radial_n_per_mm'))

@@ -122,7 +122,7 @@ class Programmed:
 
     @property
     def words(self) -> SourceWords:
-        """How its language writes feeds and speeds."""
+        """Return how its language writes feeds and speeds."""
         return self.dialect.words
 
 

@@ -82,5 +82,5 @@ def told_by_ending(text: str, ending: str, dialect: str | None) -> str | None:
 
 @lru_cache(maxsize=256)
 def _certainties(head: str) -> dict[str, float]:
-    """How sure each language is of the beginning of a text."""
+    """Return how sure each language is of the beginning of a text."""
     return {name: one.recognises(head) for name, one in dialects().items()}

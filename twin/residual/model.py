@@ -160,7 +160,9 @@ def load_model(folder: Path) -> ResidualModel:
         forest = RegressionForest(forest_of_arrays({name: a for name, a in arrays.items() if not name.startswith(REGION)}))
         region = region_of_arrays(_region(arrays), len(features))
         if forest.forest.features != len(features):
-            raise ResidualError(f"{MANIFEST} names {len(features)} features, the forest has {forest.forest.features}: train anew")
+            raise ResidualError(
+                f"{MANIFEST} names {len(features)} features, the forest has {forest.forest.features}: train again"
+            )
         model = ResidualModel(
             features, forest, region, manifest.trained, manifest.held_out, manifest.mean_residual_k, manifest.seed
         )

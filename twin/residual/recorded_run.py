@@ -1,6 +1,6 @@
 """From samples as they were recorded to what a residual is learned from: signals at ticks, and the physics beside them.
 
-The physics runs as the processor `thermal` runs it: from the measured temperature, inputs held between samples, anew after a
+The physics runs as the processor `thermal` runs it: from the measured temperature, inputs held between samples, again after a
 silence, or after so long without speed or load, as `GAP_S_MAX`.
 """
 

@@ -13,7 +13,7 @@ from twin.residual.features import AMBIENT, FEED, MEASURED, PHYSICS, RISE, SPEED
 Floats = NDArray[np.float64]
 CUTTING_RPM_MIN, CUTTING_FEED_MIN = 50.0, 1.0
 GAP_S_MAX = 600.0
-"""The processor's default: its means begin anew after so long without a signal."""
+"""The processor's default: its means begin again after so long without a signal."""
 HEATING_K, HEATING_OVER = 0.5, Feature(RISE, 1200.0)
 REGIMES = ("standing", "warm_up", "steady", "cool_down")
 """By the modelled rise beside its mean over 20 min, as the processor `gap` tells them; standing: the spindle does."""
@@ -23,7 +23,7 @@ REGIMES = ("standing", "warm_up", "steady", "cool_down")
 class Recorded:
     """Signals at ticks, as last reported before each; NaN = unknown.
 
-    t_s: (n,), s, increasing; stretch: (n,) number of the stretch: the physics and all means begin anew with each
+    t_s: (n,), s, increasing; stretch: (n,) number of the stretch: the physics and all means begin again with each
     signals: name → (n,), with `twin/spindle_temp_c`, the physics
     """
 
@@ -105,7 +105,7 @@ def table_of(recorded: Recorded, features: Sequence[Feature], row_s: float, sett
 
 
 def mean_of(t_s: Floats, values: Floats, over_s: float, fresh: NDArray[np.bool_]) -> Floats:
-    """The exponential mean (n,) of values (n,), begun anew where `fresh`: what `features.row_after` gives moment by moment.
+    """The exponential mean (n,) of values (n,), begun again where `fresh`: what `features.row_after` gives moment by moment.
 
     >>> mean_of(np.array([0.0, 100.0]), np.array([10.0, 20.0]), 100.0, np.array([True, False])).round(3).tolist()
     [10.0, 16.321]

@@ -35,7 +35,7 @@ def readings(
         return values
     acting = SENSOR.effects(effects)
     if temperature_rise_k is None and (warm := [effect.name for effect in acting if "temperature_rise_k" in effect.needs]):
-        raise EffectError(f"{warm[0]} needs a spindle temperature, which this run has not got")
+        raise EffectError(f"{warm[0]} needs a spindle temperature, which this run does not have")
     text, names = _kernel(acting)
     given = {f"{one.name}__{key}": value for one in acting for key, value in one.checked(effects[one.name]).items()}
     rise = np.zeros(len(values)) if temperature_rise_k is None else temperature_rise_k

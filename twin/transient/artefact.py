@@ -153,9 +153,9 @@ def load_detector(folder: Path) -> tuple[Detector, str]:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise TransientError(f"{folder / MANIFEST}: {where}: {first['msg']}; train it anew with this version") from None
+        raise TransientError(f"{folder / MANIFEST}: {where}: {first['msg']}; train it again with this version") from None
     if hashlib.sha256(arrays).hexdigest() != manifest.arrays_sha256:
-        raise TransientError(f"{folder / ARRAYS} is not the file that {MANIFEST} was written for; copy both, or train it anew")
+        raise TransientError(f"{folder / ARRAYS} is not the file that {MANIFEST} was written for; copy both, or train it again")
     return _detector(folder, manifest, arrays), hashlib.sha256(said).hexdigest()[:16]
 
 
@@ -166,13 +166,13 @@ def _detector(folder: Path, manifest: Manifest, arrays: bytes) -> Detector:
             raise TransientError(f"{folder / ARRAYS} unpacks to {size} bytes, more than {BYTES_MAX}: it is no template")
         parts = {name: np.asarray(held[name], dtype=np.float64) for name in ("start", "between", "end", "stretches")}
     if any(part.ndim != 1 or not np.isfinite(part).all() for part in parts.values()):
-        raise TransientError(f"{folder / ARRAYS} holds what is no template; train it anew")
+        raise TransientError(f"{folder / ARRAYS} holds what is no template; train it again")
     if not len(parts["stretches"]) or len(parts["stretches"]) > 4 * len(STRETCHES):
-        raise TransientError(f"{folder / ARRAYS} holds {len(parts['stretches'])} stretches; train it anew")
+        raise TransientError(f"{folder / ARRAYS} holds {len(parts['stretches'])} stretches; train it again")
     weighing = None
     if manifest.weighing is not None:
         if manifest.weighing.names != FEATURES:
-            raise TransientError(f"{folder / MANIFEST}: weighs {manifest.weighing.names}, not {FEATURES}; train it anew")
+            raise TransientError(f"{folder / MANIFEST}: weighs {manifest.weighing.names}, not {FEATURES}; train it again")
         weighing = Weighing(**manifest.weighing.model_dump())
     stretches = tuple(map(float, parts["stretches"]))
     template = Template(manifest.period_s, parts["start"], parts["between"], parts["end"], manifest.stall_s, stretches)

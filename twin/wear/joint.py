@@ -79,7 +79,7 @@ def trend_of(joint: Joint, name: str, fit: float = 0.0) -> Trend:
 
 
 def renewed(joint: Joint, place: int, mean: float, var: float) -> Joint:
-    """Return the knowledge after one of its quantities was drawn anew, by itself."""
+    """Return the knowledge after one of its quantities was drawn again, by itself."""
     rows = [[0.0 if place in {row, column} else value for column, value in enumerate(own)] for row, own in enumerate(joint.rows)]
     rows[place][place] = var
     means = (*joint.means[:place], mean, *joint.means[place + 1 :])

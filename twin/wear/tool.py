@@ -249,7 +249,7 @@ def leap(tool: Tool, told: Told, material: float) -> float | None:
 
 
 def doubted(tool: Tool, told: Told, material: float, wear: float) -> Tool:
-    """Return the tool whose sharp level in these operations is not believed any more, and learned anew from its wear."""
+    """Return the tool whose sharp level in these operations is not believed any more, and learned again from its wear."""
     bases = dict(tool.bases)
     for name, value in told.logs.items():
         own = value - material

@@ -139,7 +139,7 @@ class Subscriptions:
         self.used(subscription)
 
     def used(self, subscription: Subscription) -> None:
-        """Take note that the client has asked for updates: the time after which it counts as abandoned begins anew."""
+        """Take note that the client has asked for updates: the time after which it counts as abandoned begins again."""
         subscription.used_s = self._clock()
 
     # What the plant tells.

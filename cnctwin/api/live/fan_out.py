@@ -33,7 +33,7 @@ class Reader:
         return True
 
     def end(self) -> None:
-        """No more messages: what waits is thrown away, the stream ends, and the client begins anew with a full state."""
+        """No more messages: what waits is thrown away, the stream ends, and the client begins again with a full state."""
         self.is_over = True
         while not self.messages.empty():
             self.messages.get_nowait()

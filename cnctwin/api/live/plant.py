@@ -144,7 +144,7 @@ class LivePlant:
         found = {}
         for name in signals:
             if (signal := known.get(name)) is not None:
-                with self._lock:  # for each anew: sixty full traces would hold up the feeding thread
+                with self._lock:  # for each again: sixty full traces would hold up the feeding thread
                     found[name] = (signal.reading.unit, signal.trace.since(from_ms, to_ms))
         return found
 

@@ -56,7 +56,7 @@ class Trace:
         return True
 
     def add(self, t_ms: int, value: Plain, quality: int, reason: str | None) -> None:
-        """One more sample. One of the same time replaces the last, an older one is left out; a clock set back begins anew."""
+        """One more sample. One of the same time replaces the last, an older one is left out; a clock set back begins again."""
         times = self._times
         if times and t_ms <= times[-1]:
             if 0 < times[-1] - t_ms <= SET_BACK_MS:

@@ -1,4 +1,4 @@
-"""The plant as Prometheus metrics. Each scrape is read from the live plant anew; nothing is counted here."""
+"""The plant as Prometheus metrics. Each scrape is read from the live plant again; nothing is counted here."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple

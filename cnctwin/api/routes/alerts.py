@@ -32,7 +32,7 @@ class Acknowledgement(BaseModel):
     by: str = Field("", max_length=100)
     comment: str = Field("", max_length=1000)
     episode: int | None = Field(
-        None, description="of the alert as it was shown; one that has begun anew since is not acknowledged"
+        None, description="of the alert as it was shown; one that has begun again since is not acknowledged"
     )
 
 
@@ -105,7 +105,7 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
         state = _kept_up(live)
         alert = _one(state, fingerprint)
         if body.episode is not None and body.episode != alert.get("episode"):
-            raise ApiError(409, f"alert {fingerprint} has begun anew since (episode {alert.get('episode')}); look at it again")
+            raise ApiError(409, f"alert {fingerprint} has begun again since (episode {alert.get('episode')}); look at it again")
         fields = {"fingerprint": alert["fingerprint"], "episode": alert.get("episode"), "by": by, "comment": body.comment}
         return await _command(live, viewer, "ack", fields)
 

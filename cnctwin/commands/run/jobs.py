@@ -141,7 +141,7 @@ def submit(
 
 @jobs_app.command("list")
 def list_jobs(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False) -> None:
-    """What runs, what waits, what is over."""
+    """List what runs, what waits, what is over."""
     with JobsClient(_broker(broker)) as jobs:
         state = _answered(lambda: jobs.state(wait_s))
         if as_json:

@@ -24,7 +24,7 @@ class Rising:
     """Counts of members that come, go and begin again at 0, summed so that the sum never falls.
 
     >>> sums = Rising()
-    >>> for member, count in (("a", 5), ("b", 7), ("a", 1), ("b", 8)):  # a was started anew
+    >>> for member, count in (("a", 5), ("b", 7), ("a", 1), ("b", 8)):  # a was started again
     ...     sums.take(member, {"records": count})
     >>> sums.leave("b")
     >>> sums.total["records"]

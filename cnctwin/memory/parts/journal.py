@@ -1,4 +1,4 @@
-"""The deliveries to one receiver, on the disk: up to when, and the ids of late, so that a restart sends nothing anew.
+"""The deliveries to one receiver, on the disk: up to when, and the ids of late, so that a restart sends nothing again.
 
 Written before the next part is sent. A part that was taken just before a crash is sent again, with the same id.
 """

@@ -1,6 +1,6 @@
 """One answer from both tiers: the hot samples and the list of sealed files are taken in one transaction, the files read after it.
 
-A file that a sweep or a rewriting has removed meanwhile is no loss: the question is asked anew, and finds what took its place.
+A file that a sweep or a rewriting has removed meanwhile is no loss: the question is asked again, and finds what took its place.
 """
 
 import logging

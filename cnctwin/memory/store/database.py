@@ -171,7 +171,7 @@ class Readers:
             old: list[sqlite3.Connection] = []
             if now != self._of:
                 old, self._kept, self._of = self._kept, [], now
-        for db in old:  # the store was begun anew beside us
+        for db in old:  # the store was begun again beside us
             db.close()
         return connect(self.file, writable=False), now
 

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 WIDTH = 1000.0
 COLUMNS = 500
-"""Finest division of a path that is drawn into the page; on screen it is drawn anew as finely as the screen is."""
+"""Finest division of a path that is drawn into the page; on screen it is drawn again as finely as the screen is."""
 
 
 @dataclass(frozen=True, slots=True)

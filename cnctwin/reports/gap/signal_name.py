@@ -98,7 +98,7 @@ def effect_phrase(effect: str, on: str = "") -> str:
 
 
 def effect_words(name: str) -> tuple[str, Effect | None]:
-    """Return an effect in words for a sentence, and the effect; of one that the catalogue has not got, neither.
+    """Return an effect in words for a sentence, and the effect; of one that the catalogue does not have, neither.
 
     The sentence is the first one of the effect's file: a file begins with what it is.
     """

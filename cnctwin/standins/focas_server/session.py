@@ -28,7 +28,7 @@ from cnctwin.standins.focas_server.shown import Moment
 IDLE_S_MAX = 300.0
 HANG_LOOK_S = 0.01
 COMMANDS = 2
-"""A client's word at the open that wants to send commands; 1 wants to transfer files, which this server has not got."""
+"""A client's word at the open that wants to send commands; 1 wants to transfer files, which this server does not have."""
 
 
 @dataclass

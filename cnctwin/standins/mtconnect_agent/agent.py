@@ -39,7 +39,7 @@ class Agent:
         self._buffer_size = buffer_size
         self._assets_max = assets_max
         self._adapter_is_lost = False
-        self._machine: dict[str, tuple[str, Entry]] = {}  # what the adapter would send anew: key → stamp and values
+        self._machine: dict[str, tuple[str, Entry]] = {}  # what the adapter would send again: key → stamp and values
         self._last_stamp = stamp_text(now())
         self.instance_id = 0
         self._begin_instance()
@@ -76,7 +76,7 @@ class Agent:
             self.changed.notify_all()
 
     def restart(self) -> None:
-        """Begin anew: another instance id, sequence numbers from 1, an empty buffer; then the adapter connects."""
+        """Begin again: another instance id, sequence numbers from 1, an empty buffer; then the adapter connects."""
         with self.changed:
             self._begin_instance()
             if not self._adapter_is_lost:
@@ -90,7 +90,7 @@ class Agent:
             self.changed.notify_all()
 
     def has_ended(self, instance_id: int) -> bool:
-        """Return True if a stream that began in this instance must end: the agent stopped, or started anew."""
+        """Return True if a stream that began in this instance must end: the agent stopped, or started again."""
         return self.is_closed or self.instance_id != instance_id
 
     @property

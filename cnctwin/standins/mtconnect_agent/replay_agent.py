@@ -120,7 +120,7 @@ class ReplayAgent:
         self.agent.adapter_lost()
 
     def adapter_back(self) -> None:
-        """Restore it: the adapter sends its present values anew."""
+        """Restore it: the adapter sends its present values again."""
         self.agent.adapter_back()
 
     def restart(self) -> None:

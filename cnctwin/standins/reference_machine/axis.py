@@ -20,7 +20,7 @@ STEPS = 20
 
 
 class AxisPhysics(NamedTuple):
-    """Constants of an axis; from `gravity_n` on, what a nominal axis has not got, at nothing.
+    """Constants of an axis; from `gravity_n` on, what a nominal axis does not have, at nothing.
 
     N, mm, s, A, kg. cable_n_per_mm is of the chain, spot_* of a place with more friction, wait_* of a breakaway force that grows
     at rest, fade of a drive that weakens as it is loaded, leak_per_s the rate at which the controller forgets its integral.

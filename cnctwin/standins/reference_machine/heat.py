@@ -17,7 +17,7 @@ STEPS = 5
 
 
 class HeatPhysics(NamedTuple):
-    """Constants; from `column_w_per_k` on, what a nominal spindle has not got, at nothing.
+    """Constants; from `column_w_per_k` on, what a nominal spindle does not have, at nothing.
 
     coolant comes up within `coolant_s`; cabinet_* is a second source of heat with its own cycle; tight a bearing that rubs more
     from a rise of `tight_k` on; radiant heat by the hall, which grows over the day; radiating heat that goes off with a power of

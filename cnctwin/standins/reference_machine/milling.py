@@ -20,7 +20,7 @@ SLICES = 16
 
 
 class CutPhysics(NamedTuple):
-    """Tool and material; from `edge_n_per_mm` on, what a nominal cut has not got, at nothing.
+    """Tool and material; from `edge_n_per_mm` on, what a nominal cut does not have, at nothing.
 
     chipped_mm is by how much tooth 0 is shorter, hard_* a stretch of the way where the material is harder, deep_* a depth from
     which it is, chatter_* a vibration of the force at a frequency of its own.

@@ -18,7 +18,7 @@ WINDOW = 100
 
 @dataclass(frozen=True, slots=True)
 class MeterPhysics:
-    """Spindle drive and meter; from `drop` on, what a nominal one has not got, at nothing.
+    """Spindle drive and meter; from `drop` on, what a nominal one does not have, at nothing.
 
     bent: exponent by which the reading departs from proportion (read at 20 %), dead_pct: the change that the meter does not show,
     beat_*: a slow beat of the mains on the reading, worn_kw_per_s: idle power that grows as the run goes on

@@ -1,6 +1,6 @@
 """The reference machine's own statement, and what it truly is: the same figures, the physical ones a few percent off.
 
-A stated machine is drawn anew for each question, so that no figure of one can be learned.
+A stated machine is drawn again for each question, so that no figure of one can be learned.
 """
 
 from collections.abc import Mapping

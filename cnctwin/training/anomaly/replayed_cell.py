@@ -87,7 +87,7 @@ def _replayed_parts(stretch: Stretch, models: Mapping[str, AnomalyModel], settin
     config = Config.model_validate(settings)
     parts = {name: model.parts for name, model in models.items() if name in stretch and model.parts is not None}
     if other := [name for name in stretch if name not in parts]:
-        raise UsageError(f"the model of {other[0]} was not trained for common_mode = parts: train it anew")
+        raise UsageError(f"the model of {other[0]} was not trained for common_mode = parts: train it again")
     first = next(iter(parts.values()))
     ticks = PartTicks(
         signals=first.signals,

@@ -2,7 +2,7 @@
 
 KernelCPD (Arlot, Celisse and Harchaoui 2019; linear kernel, which is the exact search for changes of the mean) over windows of
 the level, thinned to at most POINTS. Changes that follow each other closely are one transient. What goes down and comes up
-again, and does so a lot, is listed first: a change of tool stops the spindle and starts it anew.
+again, and does so a lot, is listed first: a change of tool stops the spindle and starts it again.
 """
 
 import importlib

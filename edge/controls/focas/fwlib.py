@@ -130,7 +130,7 @@ class Fwlib:
         return Answer(found) if isinstance(found, int) else Answer(OK, found)
 
     def _invoke(self, name: str, *arguments: Any) -> int:
-        """A function of the library, by name; EW_FUNC where this library has not got it."""
+        """A function of the library, by name; EW_FUNC where this library does not have it."""
         assert name in READS, name
         function = getattr(self._library, name, None)
         if function is None:

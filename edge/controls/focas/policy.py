@@ -6,7 +6,7 @@ one below 0 comes from the way to it.
 >>> policy_of(-16), policy_of(-1), policy_of(6), policy_of(5), policy_of(0)
 (<Policy.RECONNECT: 'reconnect'>, <Policy.RETRY: 'retry'>, <Policy.GIVE_UP: 'give up'>, <Policy.BAD: 'bad'>, <Policy.OK: 'ok'>)
 >>> told(6)
-'EW_NOOPT (6): the control has not got the option for this function'
+'EW_NOOPT (6): the control does not have the option for this function'
 """
 
 from enum import Enum
@@ -49,12 +49,12 @@ _CODES = {
     -3: _Code("EW_MMCSYS", Policy.BAD, "the extended driver is missing"),
     -2: _Code("EW_RESET", Policy.RETRY, "a reset or stop came in between"),
     -1: _Code("EW_BUSY", Policy.RETRY, "the control is busy"),
-    1: _Code("EW_FUNC", Policy.GIVE_UP, "the control has not got this function"),
+    1: _Code("EW_FUNC", Policy.GIVE_UP, "the control does not have this function"),
     2: _Code("EW_LENGTH", Policy.BAD, "wrong length of data"),
     3: _Code("EW_NUMBER", Policy.BAD, "no such number"),
     4: _Code("EW_ATTRIB", Policy.BAD, "wrong attribute"),
     5: _Code("EW_DATA", Policy.BAD, "wrong data"),
-    6: _Code("EW_NOOPT", Policy.GIVE_UP, "the control has not got the option for this function"),
+    6: _Code("EW_NOOPT", Policy.GIVE_UP, "the control does not have the option for this function"),
     7: _Code("EW_PROT", Policy.BAD, "protected"),
     8: _Code("EW_OVRFLOW", Policy.BAD, "memory overflow"),
     9: _Code("EW_PARAM", Policy.BAD, "wrong parameter of the control"),

@@ -136,7 +136,7 @@ def value(data: bytes) -> float | int | None:
 
 
 def values(data: bytes, count: int) -> tuple[float | int | None, ...]:
-    """The first `count` values of a row; what is behind them is of axes that the control has not got."""
+    """The first `count` values of a row; what is behind them is of axes that the control does not have."""
     if len(data) < count * _VALUE.size:
         raise DocumentError(f"{len(data)} bytes hold no {count} values")
     return tuple(value(data[at * _VALUE.size : (at + 1) * _VALUE.size]) for at in range(count))

@@ -100,7 +100,7 @@ class MtconnectConnection:
                     yield error_document(str(error) or type(error).__name__)
                     yield Wait(None)
                     continue
-                yield Wait(None)  # what comes next connects anew
+                yield Wait(None)  # what comes next connects again
                 if not self._closed.is_set():
                     self._lost(error)
                 continue

@@ -186,7 +186,7 @@ def _on_with_samples(cursor: Cursor) -> Cursor:
 
 
 def _new_instance(after: Cursor, before: Cursor, header: Header) -> Cursor:
-    """The agent is another: its numbers start anew, and what the old one had after our last request is lost.
+    """The agent is another: its numbers start again, and what the old one had after our last request is lost.
 
     Where the one that we left answers after all, and nothing was taken in between, we go on where we were.
     """
@@ -286,5 +286,5 @@ def _alarms_anew(cursor: Cursor, samples: SampleSet, document: StreamsDocument) 
     alarms: tuple[Alarm, ...] = ()
     for o in readable:
         alarms = observed(alarms, o)
-    anew = alarm_samples(cursor, alarms, readable[-1], is_baseline=True, observations=0)
-    return replace(cursor, alarms=alarms), replace(samples, samples=(*samples.samples, *anew))
+    again = alarm_samples(cursor, alarms, readable[-1], is_baseline=True, observations=0)
+    return replace(cursor, alarms=alarms), replace(samples, samples=(*samples.samples, *again))

@@ -100,7 +100,7 @@ def _sample(target: Target, observation: Observation, is_baseline: bool) -> Edge
 
 
 def _chosen(cursor: Cursor, observation: Observation, is_baseline: bool, *, is_counted: bool) -> list[EdgeSample]:
-    """What [variables] and [plc] read of this observation. Of several values of one, the first accounts for it."""
+    """Return what [variables] and [plc] read of this observation. Of several values of one, the first accounts for it."""
     found = list[EdgeSample]()
     for item in cursor.chosen:
         if item.data_item_id != observation.data_item_id or observation.is_condition:

@@ -24,7 +24,7 @@ ALARMS_MAX = 256
 
 
 class Phase(StrEnum):
-    """How much is known of the alarms."""
+    """Says how much is known of the alarms."""
 
     NONE = "none"  # no events are heard
     ASKED = "asked"  # the server was asked for the alarms that are there already

@@ -2,7 +2,7 @@
 
     own thread: connect → resolve → subscribe → deliveries, and the server's status once a second ─► queue ─► frames()
 
-The library's own reconnect is not used: it goes on without telling what was lost. Here each session is built anew, and begins
+The library's own reconnect is not used: it goes on without telling what was lost. Here each session is built again, and begins
 with the hole since the last one was heard. Silence is found by a watchdog: keep-alives and status reads have to come in time.
 """
 

@@ -22,7 +22,6 @@ from edge.sample import EMPTY, SampleSet
 from edge.signals import signal
 from edge.sweep import Sweep
 from edge.units import conversion
-from twin.vocabulary.faults import report
 
 SHOWN_MAX, SHOWN_ALARMS_MAX = 200, 20
 _NO_FILE = Path("the address")  # what messages name in place of a file
@@ -68,7 +67,7 @@ def _config(url: str) -> Config:
     try:
         return EdgeConfig(path=_NO_FILE, source=OpcUaConfig.model_validate(given | {"url": address, "map": ""}))
     except ValidationError as error:
-        raise ConfigError(report(_NO_FILE, faults_in("opcua", OpcUaConfig, error))) from error
+        raise ConfigError(f"{_NO_FILE}: {'; '.join(faults_in('opcua', OpcUaConfig, error))}") from error
 
 
 async def _drafted(config: Config, device: str) -> str:

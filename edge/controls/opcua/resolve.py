@@ -1,4 +1,4 @@
-"""The way from the names of a map to the nodes of one server, anew at each connection: namespace indices may have changed.
+"""The way from the names of a map to the nodes of one server, again at each connection: namespace indices may have changed.
 
 A point with a node is looked up by its namespace's URI. A point of a companion model is looked for: the objects below Objects and
 Machines are browsed, with bounds, for objects of its type; the path goes on from there by browse names.

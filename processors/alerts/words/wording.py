@@ -383,8 +383,7 @@ def _filled(template: Template, values: Mapping[str, Any]) -> str:
     """Return a template filled with values, cut off where it is far too long: what it writes is not kept in memory."""
     text = ""
     for piece in template.generate(values):
-        text += piece
-        if len(text) > FILLED_MAX:
+        if len(text := text + piece) > FILLED_MAX:
             break
     return text
 
@@ -395,7 +394,6 @@ def _one_line(text: str) -> str:
 
 def _spelled(name: str) -> str:
     """Return the name of a signal or an alert as words.
-
     >>> _spelled("twin/rule_lubricant_low")
     'lubricant low'
     """

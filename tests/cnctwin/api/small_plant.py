@@ -37,7 +37,7 @@ def birth(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: 
 
 
 def data(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: str | None = "vmc") -> HostEvent:
-    """What has changed."""
+    """Return what has changed."""
     return HostEvent(EventKind.DATA, node, machine, t_ms, tuple(reading(name, value, t_ms) for name, value in values.items()))
 
 
@@ -48,7 +48,7 @@ def death(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: 
 
 
 def modelled(_node: NodeId, _device: str | None) -> Mapping[str, PropertySet]:
-    """What the birth of a twin says of its metrics."""
+    """Return what the birth of a twin says of its metrics."""
     text = DataType.STRING
     return {
         "twin/spindle_temp_c": {"provenance": PropertyValue(text, "modelled"), "meaning": PropertyValue(text, "rise + ambient")}
@@ -82,7 +82,7 @@ class Client:
 
     @property
     def cookies(self) -> httpx.Cookies:
-        """What was set."""
+        """Return what was set."""
         return self._client.cookies
 
     def request(self, method: str, path: str, **options: Any) -> httpx.Response:

@@ -154,7 +154,7 @@ def test_a_model_of_other_constants_corrects_nothing(models: Path) -> None:
     with client_of(models=Models(models)) as client:
         told = client.post("/predict", json=course("okuma", 8000.0)).json()
     assert told["corrected_temp_c"] is None
-    assert "corrects another heat of the spindle; train it anew" in told["basis"]["residual"]
+    assert "corrects another heat of the spindle; train it again" in told["basis"]["residual"]
 
 
 def test_models_that_are_not_there_or_damaged_leave_the_physics(models: Path, tmp_path: Path) -> None:

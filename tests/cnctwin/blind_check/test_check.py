@@ -132,7 +132,7 @@ def test_the_same_question_has_the_same_answer_and_the_same_recording() -> None:
 
 
 def write_unseen(folder: Path, question: Question) -> None:
-    """Write a case of the same machine whose only runs are of programs that the case of `write_case` has not got."""
+    """Write a case of the same machine whose only runs are of programs that the case of `write_case` does not have."""
     machine = machine_of(question)
     physics = physics_with(machine, answer_of(question))
     write_folder(folder, machine, physics, [(kind, UNSEEN) for kind in question.kinds])

@@ -25,6 +25,7 @@ SAME = {
 }
 SAME |= {"--to", "--every", "--no-open"}
 TO_SAY_MORE = {("validate", "--from"), ("validate", "--broker"), ("edge discover", "--device"), ("jobs submit", "--machine")}
+TO_SAY_MORE |= {("init", "--broker"), ("init", "--device")}
 
 
 class Option(NamedTuple):

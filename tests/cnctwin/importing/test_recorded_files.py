@@ -224,7 +224,7 @@ def test_files_in_a_row_go_on_by_their_times_and_a_gap_is_said(tmp_path: Path) -
 def test_a_file_that_begins_anew_is_put_behind_and_the_gap_is_called_unknown(tmp_path: Path) -> None:
     run, account = imported(tmp_path, log(tmp_path / "a.csv", 0.0, 10), log(tmp_path / "b.csv", 0.0, 10))
     assert (len(run), round(run.t_s[10], 9), round(run.t_s[-1], 9)) == (20, 1.0, 1.9)
-    assert any("b.csv begins anew at 0 s" in remark and "not known" in remark for remark in account.remarks)
+    assert any("b.csv begins again at 0 s" in remark and "not known" in remark for remark in account.remarks)
 
 
 def test_what_two_files_both_have_is_taken_once(tmp_path: Path) -> None:

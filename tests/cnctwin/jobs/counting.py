@@ -87,7 +87,7 @@ def register() -> None:
 
 
 def chain_to(number: int) -> str:
-    """What an uninterrupted count comes to."""
+    """Return what an uninterrupted count comes to."""
     chain = ""
     for one in range(number):
         chain = hashlib.sha256(f"{chain}{one}".encode()).hexdigest()
@@ -95,7 +95,7 @@ def chain_to(number: int) -> str:
 
 
 def checkpoint_of(folder: Path) -> int:
-    """How far a job in this folder has counted."""
+    """Return how far a job in this folder has counted."""
     return int((read_json(folder / "checkpoint.json") or {"number": 0})["number"])
 
 

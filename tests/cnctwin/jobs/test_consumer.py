@@ -55,7 +55,7 @@ class Plant:
                     self.shown.setdefault((event.device or "", reading.name), []).append(reading.value)
 
     def is_heard(self) -> bool:
-        """Whether a consumer listens: it says how jobs stand when it has subscribed, and on the same connection."""
+        """Return whether a consumer listens: it says how jobs stand when it has subscribed, and on the same connection."""
         return any(topic == topics.JOBS_STATE for topic, _ in self.plain)
 
     def said(self, device: str, name: str) -> list[object]:

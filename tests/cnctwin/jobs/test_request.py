@@ -40,7 +40,7 @@ KEYS = st.sampled_from(["job", "id", "reply_to", "case", "program", "program_tex
         ({"probability": 0.3}, "probability = 0.3: Input should be greater than or equal to 0.5"),
         ({"population": 7}, "population = 7: Input should be a multiple of 2"),
         ({"encoding": "cp437"}, "encoding = 'cp437': Input should be 'utf-8', 'utf-8-sig' or 'latin-1'"),
-        ({"encoding": "latin-1", "program_text": "(⌀ 6)"}, "program_text has the sign '⌀', which latin-1 has not got"),
+        ({"encoding": "latin-1", "program_text": "(⌀ 6)"}, "program_text has the sign '⌀', which latin-1 does not have"),
         (
             {"encoding": "latin-1", "program": "a.nc", "program_text": None},
             "encoding and name are those of program_text; a file has its own",

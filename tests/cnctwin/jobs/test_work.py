@@ -39,7 +39,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> FilesRoot:
 
 
 def done(folder: Path, files: FilesRoot, **asked: object) -> dict[str, object]:
-    """What the process of a job says in the end."""
+    """Return what the process of a job says in the end."""
     folder.mkdir(exist_ok=True)
     (folder / "request.json").write_text(json.dumps({"id": "a", **asked}))
     return attempt(folder, files, 1, None)

@@ -59,7 +59,7 @@ def way_round(
         told = plant.document.get("challenger") or {}
         causes = told.get("causes") or [cause for step in plant.steps("filed") for cause in plant.causes(step.version)]
         if promoted_h is not None:
-            plant.work(machine, 0.5)  # the figures begin anew
+            plant.work(machine, 0.5)  # the figures begin again
             plant.work_until(machine, lambda: _worst(plant) < CLOSED_FLOORS, CLOSED_HOURS)
             after = _worst(plant)
         return WayRound(

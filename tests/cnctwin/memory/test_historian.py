@@ -205,7 +205,7 @@ def test_a_memory_with_a_hole_says_so_at_the_start(memory: Memory) -> None:
 
 
 def row_of(number: int, kind: EventKind = EventKind.DATA) -> HostEvent:
-    """What an edge that waits for receipts says."""
+    """Return what an edge that waits for receipts says."""
     names: dict[str, Any] = {"Device Control/Receipt": ""} if kind is EventKind.BIRTH else {"edge_sequence": number}
     readings = tuple(Reading(name, value, number, Quality.GOOD, None, None, False) for name, value in names.items())
     return HostEvent(kind, EDGE, "vmc", number, readings)

@@ -127,7 +127,7 @@ def test_every_row_is_in_the_store_once(tmp_path: Path, mosquitto: Mosquitto) ->
 
 
 def stored(folder: Path) -> int:
-    """How many rows; none while the historian is still making its tables."""
+    """Return how many rows; none while the historian is still making its tables."""
     try:
         return len(values(folder))
     except StoreError:
@@ -135,7 +135,7 @@ def stored(folder: Path) -> int:
 
 
 def values(folder: Path) -> list[object]:
-    """What the store has of the rows, in the order of their stamps."""
+    """Return what the store has of the rows, in the order of their stamps."""
     if not (folder / "store").exists():
         return []
     store = open_store(folder / "store")

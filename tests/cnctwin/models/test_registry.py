@@ -121,7 +121,7 @@ def test_a_kind_that_the_manifest_does_not_say_is_refused(tmp_path: Path) -> Non
 
 def test_a_damaged_pointer_is_said_and_promoting_is_the_way_out(own: Shelf) -> None:
     (own.folder / "current.json").write_text("{")
-    with pytest.raises(UsageError, match=r"is not JSON.*; cnctwin model promote writes it anew"):
+    with pytest.raises(UsageError, match=r"is not JSON.*; cnctwin model promote writes it again"):
         own.pointer()
     registry.promoted(own, by_seed(own)[3], "", NOW_S)
     assert champion(own) == by_seed(own)[3]

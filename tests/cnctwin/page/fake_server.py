@@ -49,7 +49,7 @@ class Shop:
         self.posted: list[tuple[str, Any]] = []
 
     def told(self, machine: str, t_ms: int) -> tuple[dict[str, SignalValue], int]:
-        """What a machine says at a moment, and of when that is."""
+        """Return what a machine says at a moment, and of when that is."""
         t_ms = min(t_ms, self.offline_since.get(machine, t_ms))
         all_of_it = {**signals(self.numbers[machine], t_ms / 1000.0), **self.other.get(machine, {})}
         without = self.without.get(machine)

@@ -25,7 +25,7 @@ EDGE, TWIN = NodeId("cnc", "edge-vmc"), NodeId("cnc", "twin-thermal")
 
 
 def event(kind: EventKind, node: NodeId, told: Mapping[str, SignalValue], t_ms: int, quality: Quality | None = None) -> HostEvent:
-    """What a host application hears of the node; twins come of a node of their own."""
+    """Return what a host application hears of the node; twins come of a node of their own."""
     is_twin = node is TWIN
     readings = tuple(
         Reading(name, one.value, t_ms, quality or (Quality.BAD if one.reason else Quality.GOOD), one.unit, one.reason, False)
@@ -36,7 +36,7 @@ def event(kind: EventKind, node: NodeId, told: Mapping[str, SignalValue], t_ms: 
 
 
 def describe(node: NodeId, _device: str | None) -> Mapping[str, PropertySet]:
-    """What the birth certificates say of the twin's metrics."""
+    """Return what the birth certificates say of the twin's metrics."""
     if node is not TWIN:
         return {}
     told = signals(0, 0.0)

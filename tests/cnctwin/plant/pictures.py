@@ -43,5 +43,5 @@ class Pictures:
         return (*self._pictures, NodeId("cnc", "unborn"))
 
     def picture(self, node: NodeId) -> NodePicture | None:
-        """What is known of one."""
+        """Return what is known of one."""
         return self._pictures.get(node)

@@ -30,7 +30,7 @@ def plant() -> Host:
 
 
 def seen(*, terminal: bool, machine: str | None = None, kind: str = "xterm") -> str:
-    """What is shown in five rounds."""
+    """Return what is shown in five rounds."""
     console = Console(file=io.StringIO(), width=140, force_terminal=terminal, _environ={"TERM": kind})
     rounds = count()
     show(plant(), console, lambda: next(rounds) > 5, machine=machine, note=lambda: "Ctrl-C ends the view")  # type: ignore[arg-type]

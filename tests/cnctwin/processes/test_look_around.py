@@ -68,7 +68,7 @@ def test_a_second_process_ends_and_the_first_goes_on(same_folder: bool, mosquitt
         first.process.kill()
         first.process.wait()
     begun_s = time.monotonic()
-    with Program(tmp_path, *command, str(folders[0])) as again:  # a supervisor starts it anew, at once
+    with Program(tmp_path, *command, str(folders[0])) as again:  # a supervisor starts it again, at once
         until(lambda: again.process.poll() is not None or _births(mosquitto) >= 2, "the first to be born again")
         assert again.process.poll() is None
     assert time.monotonic() - begun_s < 60.0

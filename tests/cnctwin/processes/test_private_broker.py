@@ -31,7 +31,8 @@ def client(port: int) -> mqtt.Client:
 
 
 def fetched_by_a_slow_reader(port: int, quiet_s_max: float) -> int:
-    """How many of 6,000 messages reach a reader that begins to read only when all have been published, until it is quiet."""
+    """Return how many of 6,000 messages reach a reader that begins to read only when all have been published, until it is
+    quiet."""
     reader, got = client(port), []
     reader.socket().setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65_536)
     reader.on_message = lambda _client, _data, message: got.append(message.payload)

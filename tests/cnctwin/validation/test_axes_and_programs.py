@@ -67,7 +67,7 @@ def mill(**changes: float) -> MachineFile:
 
 @pytest.fixture(scope="module")
 def slot() -> RunLog:
-    """What the mill records of a slot: it differs by a few per cent from what the twin is told."""
+    """Return what the mill records of a slot: it differs by a few per cent from what the twin is told."""
     return simulate(mill(mass_kg=335.0, tangential_coefficient_n_per_mm2=814.0), SLOT, seed=1).run
 
 

@@ -117,7 +117,7 @@ def test_a_lost_block_is_a_hole_and_the_values_are_null_until_the_filters_have_s
 def test_a_sender_that_starts_anew_is_a_hole_of_unknown_length() -> None:
     state, _ = folded(VALUES, blocks(shaken(1.0), first=500))
     _, found = folded(VALUES, blocks(shaken(0.3)), state)
-    assert [(gap.reason, gap.lost) for gap in found[0].frame.gaps] == [("the accelerometer's sender started anew", 0)]
+    assert [(gap.reason, gap.lost) for gap in found[0].frame.gaps] == [("the accelerometer's sender started again", 0)]
     assert [gap for delivery in found[1:] for gap in delivery.frame.gaps] == []
 
 

@@ -25,7 +25,8 @@ def speed_of(steps_s: tuple[float, ...], poll_s: float) -> Points:
 
 
 def current_of(steps_s: tuple[float, ...], offset_s: float, chance: random.Random, *, follows_speed: bool = False) -> Points:
-    """What a sensor of the edge sees, by the edge's clock: a surge of 0.2 s at each change, or a level that follows the speed."""
+    """Return what a sensor of the edge sees, by the edge's clock: a surge of 0.2 s at each change, or a level that follows the
+    speed."""
     grid = (number * 0.05 for number in range(-200, 2800))
     if follows_speed:
         return tuple((t - offset_s, sum(t >= one for one in steps_s) % 3 + chance.gauss(0, 0.05)) for t in grid)

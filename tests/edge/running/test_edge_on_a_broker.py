@@ -99,7 +99,7 @@ def play(agent: ReplayAgent, lines: int) -> None:
 
 
 def end_state_is_told(agent: ReplayAgent, config: EdgeConfig[MtconnectConfig], onlooker: Onlooker) -> bool:
-    """Whether the onlooker knows of every signal what the agent knows."""
+    """Return whether the onlooker knows of every signal what the agent knows."""
     known = {row.signal: row.value for row in describe(config)}
     return all(name in onlooker.machine and onlooker.machine[name].value == value for name, value in known.items())
 

@@ -141,7 +141,7 @@ def test_one_machine_that_hangs_floods_or_talks_nonsense_does_not_touch_the_othe
         write(tmp_path, "good2", agents["good2"].url, broker, more="lost_after_s = 20\n")
         wait(lambda: "good2" in seen.deaths, "the end of the edge whose file has changed")
         changed = seen.messages["good2"]
-        wait(lambda: seen.messages["good2"] > changed + 5, "its beginning anew")
+        wait(lambda: seen.messages["good2"] > changed + 5, "its beginning again")
         (tmp_path / "flood.toml").unlink()
         wait(lambda: "flood" in seen.deaths, "the end of the edge whose file is gone")
         (tmp_path / "good1.toml").write_text("[machine\n")

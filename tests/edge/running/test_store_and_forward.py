@@ -115,7 +115,7 @@ def written(agent: ReplayAgent, mosquitto: Mosquitto, folder: Path) -> Path:
 
 
 def uninterrupted(recorded: Path, mosquitto: Mosquitto, folder: Path) -> list[Told]:
-    """What an edge tells to which nothing happens."""
+    """Return what an edge tells to which nothing happens."""
     notebook = Notebook()
     with ReplayAgent(recorded, DEVICES, speed=0) as agent:
         agent.step(1)
@@ -164,7 +164,7 @@ def each_once(rows: dict[int, tuple[Reading, ...]]) -> list[Told]:
 
 
 def by_signal(told: Sequence[Told]) -> dict[str, list[Told]]:
-    """What the machine told; what its agent says before has the stamp of the test's own day.
+    """Return what the machine told; what its agent says before has the stamp of the test's own day.
 
     How the clocks compare is the edge's own finding, which takes it some seconds of ours.
     """

@@ -29,7 +29,7 @@ READY = {
 
 
 def told(*events: HostEvent, **table: Any) -> list[tuple[float, str, Any]]:
-    """What is published: (s after the start, metric, value)."""
+    """Return what is published: (s after the start, metric, value)."""
     engine = engine_of(PROCESSOR, **table)
     actions = [action for one in events for action in engine.feed(one, 0.0)]
     return [(at_ms / 1000, name.removeprefix("twin/"), value) for at_ms, name, value, _ in published(actions)]
@@ -221,7 +221,7 @@ def test_a_record_is_bounded_whatever_a_run_was_like() -> None:
 
 
 def test_hours_of_a_real_mazak_make_no_event_by_a_reconnect(tmp_path: Path) -> None:
-    """Bursts of UNAVAILABLE, lines that go back in time; after each burst everything is said anew."""
+    """Bursts of UNAVAILABLE, lines that go back in time; after each burst everything is said again."""
     engine, found = engine_of(PROCESSOR), []
     told_states: list[Any] = []
     for message in mazak_hours(tmp_path):

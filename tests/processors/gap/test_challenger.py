@@ -44,7 +44,7 @@ def test_the_challengers_gap_stands_beside_the_live_one_and_closes_it_at_once_wh
     engine.describe("okuma", Role.LIVE, right)
     engine.describe("okuma", Role.CHALLENGER, None)
     after = told(fed(engine, *minutes(21, 2)))
-    assert after[LOAD] == pytest.approx(0.0), "nothing begins anew"
+    assert after[LOAD] == pytest.approx(0.0), "nothing begins again"
     state = engine._machines["okuma"].live.state
     assert state.version == right.version
     assert state.cells["spindle_load_pct/air"].standing.seconds > 9 * 60.0

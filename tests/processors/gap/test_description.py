@@ -1,4 +1,4 @@
-"""The gap beside a description: what the twin says comes from the file, and a new version begins anew what it computes."""
+"""The gap beside a description: what the twin says comes from the file, and a new version begins again what it computes."""
 
 from random import Random
 from typing import Any

@@ -28,7 +28,7 @@ FLOORS = {"spindle_load_pct": 0.5, "spindle_temp_c": 0.3}
 
 
 def last(engine: Engine) -> dict[str, Change]:
-    """What a reader knows by now."""
+    """Return what a reader knows by now."""
     return engine._machines["okuma"].live.emission.latest
 
 

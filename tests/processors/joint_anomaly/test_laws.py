@@ -124,7 +124,7 @@ def expected(shift: Shift, unheard: dict[str, range] | None = None) -> Expected:
 
 
 def is_resolved(shift: Shift) -> bool:
-    """Whether some tick sees each tool change, and each pause between two."""
+    """Return whether some tick sees each tool change, and each pause between two."""
     for course in shift.says.values():
         edges = [0.0, *(at_s for at_s, values in course if "tool_change_active" in values)]
         if any(int(late) == int(early) for early, late in pairwise(edges[1:])):

@@ -207,7 +207,7 @@ def test_a_model_that_was_trained_otherwise_is_refused(monkeypatch: pytest.Monke
     model = PlainModel()
     model.parts = None  # type: ignore[attr-defined]
     monkeypatch.setattr("processors.joint_anomaly.scoring._models_in", lambda _: {"a": model})
-    with pytest.raises(ConfigurationError, match="the model of a was not trained for it: train it anew, or set the common_mode"):
+    with pytest.raises(ConfigurationError, match="the model of a was not trained for it: train it again, or set the common_mode"):
         PROCESSOR.configured({"models": "somewhere"})
     monkeypatch.setattr("processors.joint_anomaly.scoring._models_in", lambda _: {"a": models()[0]})
     with pytest.raises(ConfigurationError, match=r"tick_s = 0.1, but the model of a was trained with 1"):

@@ -74,7 +74,7 @@ def says(at_s: float, machine: str, **values: Any) -> HostEvent:
 
 
 def course(machine: str, until_s: int, changes: dict[float, dict[str, Any]]) -> list[HostEvent]:
-    """What a machine says each second and at the changes; the load is the last one said."""
+    """Return what a machine says each second and at the changes; the load is the last one said."""
     load, stream = 30.0, []
     for at_s in sorted({float(s) + 0.5 for s in range(until_s)} | set(changes)):
         values = dict(changes.get(at_s, {}))

@@ -84,7 +84,7 @@ def test_a_state_that_is_of_another_machine_is_refused() -> None:
 
 @pytest.mark.parametrize("value", GARBAGE.values(), ids=list(GARBAGE))
 def test_a_state_that_cannot_be_read_is_named_once_and_taken_back(value: bytes) -> None:
-    """It would be refused at each start, and all of the processor folded anew."""
+    """It would be refused at each start, and all of the processor folded again."""
     kept: Kept = {}
     before = folded(kept)
     kept["thermal/nobody"] = value

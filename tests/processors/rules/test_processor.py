@@ -35,7 +35,7 @@ CUTTING = {
 
 
 def last(engine: Engine) -> dict[str, Change]:
-    """What a reader knows by now."""
+    """Return what a reader knows by now."""
     return engine._machines["okuma"].live.emission.latest
 
 
@@ -51,7 +51,7 @@ def turns(actions: list[Action], name: str) -> list[tuple[float, Any]]:
 
 
 def alarms(actions: list[Action]) -> dict[str, int]:
-    """How often each rule has alarmed."""
+    """Return how often each rule has alarmed."""
     return {rule.name: sum(value is True for _, value in turns(actions, rule.metric)) for rule in RULES}
 
 

@@ -153,7 +153,7 @@ def worked(processor: AnyProcessor, host: FakeHost, edge: FakeEdge | None = None
 
 
 def snapshots(host: FakeHost) -> dict[str, bytes]:
-    """What is retained when the worker has ended."""
+    """Return what is retained when the worker has ended."""
     return {topic: payload for topic, payload, retain in host.plain if topic.startswith("cnctwin/snapshot/") and retain}
 
 

@@ -34,7 +34,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def told(engine: Any) -> dict[str, Change]:
-    """What a reader knows by now."""
+    """Return what a reader knows by now."""
     latest: dict[str, Change] = engine._machines["okuma"].live.emission.latest
     return latest
 
@@ -109,7 +109,7 @@ def test_before_a_whole_change_could_have_been_seen_it_does_not_say_no(model: st
     assert told(engine)[ACTIVE].value is None
     assert "of a change" in (told(engine)[ACTIVE].reason or "")
     fed(engine, data(30.0, **{CURRENT: 1.0}))
-    assert told(engine)[ACTIVE].value is False, "a value that is not reported anew still holds"
+    assert told(engine)[ACTIVE].value is False, "a value that is not reported again still holds"
 
 
 @pytest.mark.parametrize(

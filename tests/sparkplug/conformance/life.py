@@ -106,7 +106,7 @@ class EdgeLife:
         return sent
 
     def declare(self, device: str, metrics: tuple[MetricSpec, ...]) -> list[Sent]:
-        """Add a device, or declare it anew."""
+        """Add a device, or declare it again."""
         return self.take(self.session.declare_device(device, metrics, self._later()))
 
     def remove(self, device: str) -> list[Sent]:
@@ -149,7 +149,7 @@ class EdgeLife:
         return [sent for sent in self.sent if sent.verb in verbs]
 
     def subscriptions(self, session: int) -> list[Subscribe]:
-        """What was subscribed on a connection."""
+        """Return what was subscribed on a connection."""
         return [action for number, action in self.log if number == session and isinstance(action, Subscribe)]
 
     def deaths(self) -> list[Any]:
@@ -222,7 +222,7 @@ class HostLife:
         return self.take()
 
     def take(self) -> list[Action]:
-        """What the host has asked for since the last time."""
+        """Return what the host has asked for since the last time."""
         actions, self.session.actions = self.session.actions, []
         self.actions += actions
         return actions

@@ -50,7 +50,7 @@ def test_a_row_that_was_torn_is_left_out_wherever_it_was_cut(tmp_path: Path) -> 
         try:
             whole[:end].decode()
         except UnicodeDecodeError:
-            continue  # a letter in two: said, and begun anew, as below
+            continue  # a letter in two: said, and begun again, as below
         read = AliasFile(file).read()
         assert read == dict(list(ALIASES.items())[: whole[:end].count(b"\n")])
         assert kept(file, {**read, ("new", "one"): len(read) + 1}) == {**read, ("new", "one"): len(read) + 1}

@@ -38,7 +38,7 @@ class OneLine:
         object.__setattr__(self, "observed", tuple(seen))
 
     def at(self, run: int) -> Floats:
-        """Where the line is looked at: elsewhere in the run that judges."""
+        """Return where the line is looked at: elsewhere in the run that judges."""
         return np.linspace(0.0, 8.0, SAMPLES) if run == 0 else np.linspace(-4.0, 6.0, SAMPLES)
 
     def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:

@@ -69,7 +69,7 @@ def trace(log: RunLog, gap: Floats, signal: str = "x_torque_a", floor: float = 0
 
 
 def noise(log: RunLog, seed: int, floor: float = 0.01) -> Floats:
-    """What repeats: white noise of a floor, (n,)."""
+    """Return what repeats: white noise of a floor, (n,)."""
     return floor * np.random.default_rng(seed).standard_normal(len(log))
 
 

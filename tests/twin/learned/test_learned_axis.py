@@ -75,7 +75,7 @@ def test_a_term_over_the_time_of_recordings_is_no_part_of_another_run() -> None:
     [
         (
             [learned("axis_force", "temperature_c", [0.0], [1.0])],
-            "axis_force on x needs temperature_c, which this run has not got",
+            "axis_force on x needs temperature_c, which this run does not have",
         ),
         ([learned("axis_force", "position_mm", [0.0], [1.0], on="w")], "axis_force is put on 'w'; it can be on x"),
         ([learned("heat_loss", "coolant_on", [0.0, 1.0], [0.0, 1.0])], "heat_loss is put on 'x'; it can be on nothing"),

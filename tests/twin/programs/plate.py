@@ -94,7 +94,7 @@ TRUTH: Final = (
 
 
 def cuts(moves: Sequence[Move]) -> list[Cut]:
-    """What of the moves cuts. Cuts that go nowhere are left out."""
+    """Return what of the moves cuts. Cuts that go nowhere are left out."""
     found, position, tool, rpm = [], (0.0, 0.0, 0.0), 0, 0.0
     for move in moves:
         if isinstance(move, ToolChange):

@@ -36,7 +36,7 @@ def samples(hours: float, seed: int = 1, speed: float = 1.0) -> dict[str, Sample
 
 @cache
 def recorded(hours: float = 60.0, seed: int = 1, speed: float = 1.0) -> Recorded:
-    """What the physics lacks is a second mass: −0.4 of the rise, and back, with 2 h."""
+    """Return what the physics lacks is a second mass: −0.4 of the rise, and back, with 2 h."""
     told = samples(hours, seed, speed)
     start = {**told, MEASURED: Samples(told[SPEED].t_s[:1], np.array([told[AMBIENT].value[0]]))}
     plain = recorded_of(start, PHYSICS_TOLD, TICK_S)

@@ -16,7 +16,7 @@ def test_training_has_the_very_rows_that_the_processor_has() -> None:
     whole = recorded(20.0)
     known = {name: values.copy() for name, values in whole.signals.items()}
     known["spindle_rpm"][500:515] = np.nan  # 450 s: the means go on after it
-    known["feed_mm_min"][900:930] = np.nan  # 900 s: they begin anew
+    known["feed_mm_min"][900:930] = np.nan  # 900 s: they begin again
     told = Recorded(whole.t_s, np.where(whole.t_s > 50_010.0, 1, 0), known)
     found = table_of(told, EVERY, 30.0)
     memory, rows, stretch = Memory(), [], 0

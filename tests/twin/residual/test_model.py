@@ -61,7 +61,7 @@ DAMAGE = {
     "arrays missing": (lambda folder: (folder / ARRAYS).unlink(), "cannot be read"),
     "no JSON": (lambda folder: (folder / MANIFEST).write_text("{"), "is not JSON"),
     "another kind": (lambda folder: _edited(folder, kind="cnctwin anomaly model"), "kind is"),
-    "another version": (lambda folder: _edited(folder, version=2), "train anew"),
+    "another version": (lambda folder: _edited(folder, version=2), "train again"),
     "a feature less": (lambda folder: _edited(folder, features=["spindle_rpm"]), "1 features"),
     "an unknown feature": (lambda folder: _edited(folder, features=["x"] * 7), "is no feature"),
     "a key too many": (lambda folder: _edited(folder, more=1), "more"),

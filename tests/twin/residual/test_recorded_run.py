@@ -1,4 +1,4 @@
-"""Recordings with the physics beside them: as the processor `thermal` computes it, anew after a silence."""
+"""Recordings with the physics beside them: as the processor `thermal` computes it, again after a silence."""
 
 import numpy as np
 import pytest

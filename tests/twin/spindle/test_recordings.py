@@ -43,7 +43,7 @@ def residual(case: str, name: str, values: dict[str, float], effects: tuple[str,
 
 
 def fitted(case: str, effects: tuple[str, ...], start: dict[str, float]) -> tuple[dict[str, float], float, float]:
-    """What was found, and the rms on the run that was fitted and on another program."""
+    """Return what was found, and the rms on the run that was fitted and on another program."""
     names = tuple(NOMINAL | start)
     first = np.array(list((NOMINAL | start).values()))
 

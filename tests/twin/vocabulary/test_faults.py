@@ -83,8 +83,8 @@ def test_values_are_shown_as_the_caller_says_or_not_at_all() -> None:
 
 def test_a_report_is_one_line_for_one_fault_and_bounded_for_many() -> None:
     assert (
-        report("a.toml", [unknown("nam", "nam", ["name"])], "docs/x.md")
-        == "a.toml: nam is not known; did you mean name? See docs/x.md"
+        report("a.toml", [unknown("nam", "nam", ["name"])], "docs/reference/machine.md")
+        == "a.toml: nam is not known; did you mean name? See docs/reference/machine.md"
     )
     many = report("a.toml", [f"k{n} is missing" for n in range(3 * FAULTS_MAX)]).split("\n")
     assert many[0] == f"a.toml: {3 * FAULTS_MAX} faults"

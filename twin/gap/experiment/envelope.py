@@ -1,4 +1,5 @@
-"""What the recorded runs have already done, so that it is safe to do again: how far each axis went, how fast, what was cut.
+"""Describe what the recorded runs have already done, so that it is safe to do again: how far each axis went, how fast, what
+was cut.
 
 A program that a diagnosis suggests stays within this: no axis leaves the box, none goes faster, nothing is cut that was not cut.
 """
@@ -45,7 +46,7 @@ class Envelope:
 
 
 def envelope_of(logs: Iterable[RunLog]) -> Envelope:
-    """What these runs have done, all together."""
+    """Return what these runs have done, all together."""
     box: dict[str, tuple[float, float]] = {}
     home: dict[str, float] = {}
     feed: dict[str, float] = {}

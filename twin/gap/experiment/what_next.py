@@ -26,7 +26,7 @@ def what_next(
     """
     try:
         return _what_next(ground, before, after, stages, left)
-    except TwinError:  # an effect that needs what a short program in air has not got: a temperature, a cut
+    except TwinError:  # an effect that needs what a short program in air does not have: a temperature, a cut
         return None
 
 

@@ -64,7 +64,7 @@ class Opened:
 
     @property
     def _says_more(self) -> bool:
-        """Return True where an open loop is explained by effects that the closed one has not got."""
+        """Return True where an open loop is explained by effects that the closed one does not have."""
         known = self.closed.explained.best.effects if self.closed is not None else ()
         named = {e for loop in self.loops.values() if loop.verdict is Verdict.EXPLAINED for e in loop.explained.best.effects}
         return bool(named - set(known))

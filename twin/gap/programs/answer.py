@@ -262,7 +262,7 @@ def _rms(values: Floats) -> float:
 
 
 def _closures(before: Floats, after: Floats, floor: float, rng: np.random.Generator) -> Floats:
-    """Closure with sections drawn anew, (draws,)."""
+    """Closure with sections drawn again, (draws,)."""
     drawn = rng.integers(0, len(before), (DRAWS, len(before)))
     return np.array([closure_of(_rms(before[one]), _rms(after[one]), floor) for one in drawn])
 

@@ -181,7 +181,7 @@ def fit(runs: Sequence[Watched], stated: Limits, names: Sequence[str], already: 
 
 
 def _start(free: Sequence[tuple[Effect, Parameter]], moved: bool, near: Model | None) -> Floats:
-    """What a model has, else what is expected."""
+    """Return what a model has, else what is expected."""
     if near is None:
         return np.zeros(len(free) + moved)
     x = [
@@ -192,7 +192,7 @@ def _start(free: Sequence[tuple[Effect, Parameter]], moved: bool, near: Model | 
 
 
 def _centre(p: Parameter) -> float:
-    """Where a parameter is expected: a ratio at its null value, any other at what is typical."""
+    """Return where a parameter is expected: a ratio at its null value, any other at what is typical."""
     return p.null if p.null is not None and np.isfinite(p.null) and p.null > 0.0 else p.typical
 
 
@@ -227,7 +227,7 @@ def _deviation(jacobian: Floats, residuals: Floats, spread: Floats) -> Floats:
 
 
 def is_one_sided(p: Parameter) -> bool:
-    """Whether a parameter can go one way only from its null value."""
+    """Return whether a parameter can go one way only from its null value."""
     return p.null is None or np.isinf(p.null) or p.null <= p.low
 
 

@@ -5,7 +5,7 @@ energy is Σ 2 (√(1 + g²) − 1) over windows of 10 s or more of the runs to 
 operator's hand on a knob counts once, and not squared. An effect is needed in a set where the set without it has at least a tenth
 more reducible energy (and three thousandths of the whole), and where that is more than a healthy machine would give by chance:
 
-    healthy: what is left of the set, each window's sign drawn anew, on top of the set without the effect. A linear fit of the
+    healthy: what is left of the set, each window's sign drawn again, on top of the set without the effect. A linear fit of the
     effect to that, parameters of one side kept to their side, gains some energy on the runs judged on; p is how often it gains as
     much.
 
@@ -62,7 +62,7 @@ class Tried:
 
     @cached_property
     def energy(self) -> Floats:
-        """Of each window, s²."""
+        """Return the energy of each window, s²."""
         return np.asarray(2.0 * (np.sqrt(1.0 + self.gap**2) - 1.0))
 
 
@@ -144,12 +144,12 @@ def _gaps(runs: Sequence[Watched], model: Model) -> Floats:
 
 
 def _floor_energy(run: Watched) -> float:
-    """Of the recorder alone: two ends of each window, each uniform over what lies between two rows."""
+    """Return the energy of the recorder alone: two ends of each window, each uniform over what lies between two rows."""
     return len(run.recorded_s) * run.trial.resolution_s**2 / 6.0
 
 
 def _all_needed(one: Tried, tried: Mapping[Names, Tried], floor: float, chance: "_Chance", alpha: float) -> bool:
-    """Whether no effect of a set can be left out."""
+    """Return whether no effect of a set can be left out."""
     left = float(one.energy.sum())
     for name in sorted(one.names):
         less = tried[one.names - {name}]
@@ -175,7 +175,7 @@ def _is_told(fitted: Fitted, name: str) -> bool:
 
 @dataclass(frozen=True)
 class _Chance:
-    """How much a healthy machine gives an effect to gain."""
+    """Says how much a healthy machine gives an effect to gain."""
 
     learnt: Sequence[Watched]
     judged: Sequence[Watched]
@@ -195,7 +195,7 @@ class _Chance:
         return self._part(np.column_stack(columns), np.clip(noise, -NOISE_MOST_S, NOISE_MOST_S), less, more)
 
     def _slopes(self, base: Model, name: str, p: object, sign: float, runs: Sequence[Watched]) -> Floats:
-        """What a little of one parameter changes in each window."""
+        """Return what a little of one parameter changes in each window."""
         effect = effect_named(name)
         small = small_values(effect, next(one for one in effect.parameters if one is p), sign * PROBE)
         model = Model(base.stated, {**base.effects, name: small}, base.reference_mm)
@@ -219,7 +219,7 @@ class _Chance:
 def _resampled(
     tried: Mapping[Names, Tried], chosen: Tried, floor: float, rng: np.random.Generator
 ) -> tuple[dict[str, float], dict[str, tuple[str, ...]]]:
-    """How often each effect is in the best set, and what does as well, when blocks of windows are drawn anew."""
+    """Return how often each effect is in the best set, and what does as well, when blocks of windows are drawn again."""
     sets = list(tried)
     energy = np.array([tried[names].energy for names in sets])
     blocks = np.arange(energy.shape[1]) // RESAMPLED_BLOCK

@@ -196,7 +196,7 @@ def _line_indices(recorded: Floats, text: str, dialect: Dialect, path: Path) -> 
 
 
 def _pauses(columns: Mapping[str, NDArray[np.generic]], path: Path) -> tuple[Pause, ...]:
-    """Where the program did not advance, though it could have."""
+    """Return where the program did not advance, though it could have."""
     t, line = np.asarray(columns["t_s"], dtype=np.float64), np.asarray(columns["line"], dtype=np.int64)
     held = ~np.isin(np.asarray(columns["exec_state"]), list(RUNNING))
     feed = np.asarray(columns["feed_mm_min"], dtype=np.float64)
@@ -228,7 +228,7 @@ def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _longest_row(t: Floats, a: int, b: int, lost: float) -> float:
-    """Where a pause of `lost` seconds in the rows a to b begins: in the row that lasts longest, as far as it fits."""
+    """Return where a pause of `lost` seconds in the rows a to b begins: in the row that lasts longest, as far as it fits."""
     longest = a + int(np.argmax(np.diff(t[a : b + 1])))
     return float(max(t[a], min(t[longest], t[b] - lost)))
 

@@ -1,4 +1,4 @@
-"""Where the time gap lies: in which sections of the programs, and in what kind of blocks.
+"""Describe where the time gap lies: in which sections of the programs, and in what kind of blocks.
 
 Seconds add up where other signals do not, so the share of a cell is that of its seconds: |Σ gap| over the same summed over all
 cells of its signal. `section_time_s` goes from one tool change to the next; `block_time_s` sorts windows of a second or so by
@@ -100,7 +100,7 @@ class RunGap:
 
     @property
     def floor_s(self) -> float:
-        """What the recorder does not know of a window: both ends lie somewhere between two rows."""
+        """Return what the recorder does not know of a window: both ends lie somewhere between two rows."""
         return float(self.watched.trial.resolution_s / np.sqrt(6.0))
 
 

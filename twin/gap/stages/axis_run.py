@@ -71,7 +71,7 @@ class AxisRunData:
         return float(self.t_s[1] - self.t_s[0])
 
     def stretches(self) -> tuple[slice, ...]:
-        """Of motion."""
+        """Return the stretches of motion."""
         return self._stretches
 
     @cached_property

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class Form(Enum):
-    """How θ becomes a value."""
+    """Says how θ becomes a value."""
 
     FACTOR = "factor"
     LINEAR = "linear"
@@ -71,12 +71,12 @@ class Free:
 
     @property
     def is_shape(self) -> bool:
-        """Whether it says nothing while the others of its effect are null."""
+        """Return whether it says nothing while the others of its effect are null."""
         return self.form is Form.FACTOR
 
     @property
     def is_angle(self) -> bool:
-        """Whether it is an angle."""
+        """Return whether it is an angle."""
         return self.unit == "rad"
 
 

@@ -84,7 +84,7 @@ class ToolChangeStage:
 
     @property
     def candidates(self) -> tuple[Effected, ...]:
-        """Return those that the machine has not got."""
+        """Return those that the machine does not have."""
         return tuple(Effected(e.name) for e in self.effects if e.name not in self.left_out | set(self.standing))
 
     def first_guesses(self, candidate: Effected) -> Guesses:

@@ -19,7 +19,7 @@ Z: Final = 2
 
 
 def axis_letters(state: State, words: Words) -> list[int]:
-    """Axes that the block names, by index. RefusedError for an axis that the machine has not got."""
+    """Axes that the block names, by index. RefusedError for an axis that the machine does not have."""
     named = []
     for letter in words.values:
         if letter in "XYZABC":

@@ -118,7 +118,7 @@ def finish(state: State) -> Point | None:
 
 
 def put_events(out: list[Move], side: Side, position: Position, plane: int) -> Position:
-    """What came between APPR and its contour: moves of the tool's axis stay beside the first point."""
+    """Return what came between APPR and its contour: moves of the tool's axis stay beside the first point."""
     for event in side.events:
         if isinstance(event, Rapid | Linear):
             position = placed(event.end_mm, side.end, plane)

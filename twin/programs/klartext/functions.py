@@ -104,7 +104,7 @@ def refuse(word: str, reason: str) -> None:
 
 
 def right_side(text: str, number: int, word: str) -> Expression:
-    """What an FN function assigns; its operator has to be the one that the number names."""
+    """Return what an FN function assigns; its operator has to be the one that the number names."""
     if number == 0:
         return value(text, text)
     two = TWO.fullmatch(text)

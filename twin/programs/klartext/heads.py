@@ -42,7 +42,7 @@ PASSED_OVER: Final = ("BLK FORM", "SEL TABLE", "TOOL BREAK", "ERROR STOP", "SECT
 
 
 def compiled(source: Source, depth_max: int) -> Command:
-    """What a block does. RefusedError where nothing is known that begins so."""
+    """Return what a block does. RefusedError where nothing is known that begins so."""
     body = source.body
     match = PATH.match(body)
     if match is not None:

@@ -40,7 +40,7 @@ CODES: Final = (
 
 
 def before(state: State, functions: Sequence[MFunction]) -> None:
-    """What acts at the beginning of a block. RefusedError for what is not run."""
+    """Do what acts at the beginning of a block. RefusedError for what is not run."""
     for function in functions:
         code = function.code
         if code in REFUSED and code not in state.settings.builder_m_codes:
@@ -77,7 +77,7 @@ def limit_plunging(state: State, function: MFunction) -> None:
 
 
 def after(state: State, functions: Sequence[MFunction]) -> None:
-    """What acts at the end of a block; the end of the program sets `flow.ended`."""
+    """Do what acts at the end of a block; the end of the program sets `flow.ended`."""
     for function in functions:
         code = function.code
         if code == 5:

@@ -25,7 +25,7 @@ def axis_of(state: State, name: str, text: str) -> int:
 
 
 def coordinates(state: State, block: Block) -> dict[int, tuple[float, bool]]:
-    """What the block says of its axes: value in mm or degrees, and whether it is incremental."""
+    """Return what the block says of its axes: value in mm or degrees, and whether it is incremental."""
     found: dict[int, tuple[float, bool]] = {}
     for name, expression in block.values.items():
         if name not in CARTESIAN:

@@ -27,7 +27,7 @@ SPINDLE: Final = frozenset({3, 4, 13, 14})
 
 
 def _body(line: str) -> tuple[str, int]:
-    """What the control reads of a line, in capitals, and where it begins."""
+    """Return what the control reads of a line, in capitals, and where it begins."""
     part, *_ = part_of(line, 0)
     if not part.body:
         return "", len(line)

@@ -51,7 +51,7 @@ def switch(state: State, words: Words) -> None:
 
 
 def refuse_inside(state: State, text: str) -> None:
-    """What cannot stand between G41 or G42 and G40."""
+    """Refuse what cannot stand between G41 or G42 and G40."""
     if in_force(state):
         raise RefusedError(text, "cannot stand between G41 or G42 and G40; cancel with G40 and a move first")
 

@@ -21,7 +21,7 @@ NAMES: Final = ("CHF", "CHR", "RND")
 
 
 class Corner(NamedTuple):
-    """What a block says of the corner behind it."""
+    """Holds what a block says of the corner behind it."""
 
     kind: str
     size_mm: float

@@ -2,7 +2,7 @@
 
     machine = basic offset + settable offset (G54 …) + programmable frame (point) + tool length
 
-The programmable frame is a matrix and a translation. TRANS, ROT, SCALE and MIRROR begin it anew; ATRANS, AROT, ASCALE and
+The programmable frame is a matrix and a translation. TRANS, ROT, SCALE and MIRROR begin it again; ATRANS, AROT, ASCALE and
 AMIRROR act in the coordinates that it has made so far. Several angles of one ROT turn about Z, then the new Y, then the new X
 ("Fundamentals", chapter "Coordinate transformations (frames)").
 """

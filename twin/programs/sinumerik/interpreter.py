@@ -122,7 +122,7 @@ class Interpreter:
             raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
 
     def finish(self) -> None:
-        """What is still open at the end of the program."""
+        """Finish what is still open at the end of the program."""
         state = self.state
         if state.pending_angle is not None:
             raise RefusedError(state.pending_angle.text, "the program ends; a line by its angle needs a line behind it")
@@ -250,7 +250,7 @@ class Interpreter:
             run_cycle(self.state, called, given, self.at_each_position)
 
     def at_each_position(self) -> None:
-        """What MCALL has at the positions of a pattern; nothing where it has none."""
+        """Run what MCALL has at the positions of a pattern; nothing where it has none."""
         modal = self.flow.modal
         if modal is None:
             return

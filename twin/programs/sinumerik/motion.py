@@ -1,4 +1,4 @@
-"""Where the axis words of a block go, and how a motion is put out."""
+"""Describe where the axis words of a block go, and how a motion is put out."""
 
 import math
 from typing import Final
@@ -23,7 +23,8 @@ def named_axes(state: State, words: Words) -> list[int]:
 
 
 def axis_value(state: State, axis: int, given: Given, now: float) -> float:
-    """Where an axis word goes, in program coordinates: G90 and G91, AC() and IC(), and for rotary axes DC(), ACP(), ACN()."""
+    """Return where an axis word goes, in program coordinates: G90 and G91, AC() and IC(), and for rotary axes DC(), ACP(),
+    ACN()."""
     value = given.number
     rotary = axis > Z
     if not rotary:

@@ -12,7 +12,7 @@ Point = tuple[float, float]
 
 
 def polar_target(state: State, words: Words, now: Point) -> Point:
-    """Where AP and RP go, in program coordinates of the plane; what is left out stays as it was, or as the tool stands."""
+    """Return where AP and RP go, in program coordinates of the plane; what is left out stays as it was, or as the tool stands."""
     first, second, _ = PLANES[state.plane]
     stray = next((words.values[name] for at in (first, second) if (name := state.axes[at].upper()) in words.values), None)
     if stray is not None:

@@ -79,7 +79,7 @@ def find_word(line: str, letter: str) -> WordPlace | None:
 
 
 def value_end(all_pieces: list[Piece], at: int) -> int:
-    """Where the expression ends that begins at a token."""
+    """Return where the expression ends that begins at a token."""
     end, wants_operand = all_pieces[at - 1].end, True
     for piece in all_pieces[at:]:
         is_operator = piece.group == 8 or piece.text in ("DIV", "MOD")

@@ -42,7 +42,7 @@ class Cell:
     values: list[Value]
 
     def place(self, index: tuple[Value, ...], word: str) -> int:
-        """Where an element lies. RefusedError beside the array."""
+        """Return where an element lies. RefusedError beside the array."""
         if len(index) != len(self.sizes):
             raise RefusedError(word, f"has {len(self.sizes)} indices, not {len(index)}")
         found = 0
@@ -67,7 +67,7 @@ def converted(kind: str, value: Value, word: str) -> Value:
 
 
 class Variables:
-    """What the expressions of a running program read, and its assignments write."""
+    """Holds what the expressions of a running program read, and its assignments write."""
 
     __slots__ = ("local", "r", "system")
 

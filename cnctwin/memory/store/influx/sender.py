@@ -142,7 +142,7 @@ class Sender:
             self._cursor = upto
 
     def _settle(self) -> None:
-        """Let go of what the server has had for long enough; all of it is sent again where the server was started anew."""
+        """Let go of what the server has had for long enough; all of it is sent again where the server was started again."""
         asked_s = self._clock()
         if self._server.settle_s <= 0 or not (self._must_check or asked_s - self._checked_s >= self._server.settle_s):
             return
@@ -153,7 +153,7 @@ class Sender:
             with self._lock:
                 self._unsettled.clear()
                 self._cursor = 0
-            _log.warning("the store's server was started anew: what it had not settled is sent again")
+            _log.warning("the store's server was started again: what it had not settled is sent again")
             return
         while self._unsettled and asked_s - self._unsettled[0][0] >= self._server.settle_s:
             _, upto, _, refused = self._unsettled[0]

@@ -1,7 +1,7 @@
 """VictoriaMetrics as a server for lines (https://docs.victoriametrics.com/single-server-victoriametrics/#how-to-send-data-from-influxdb-compatible-agents-such-as-telegraf).
 
 It has no log on the disk before it acknowledges: what it took in the last seconds is lost when it is killed. So what was sent stays
-in the ring until the server has lived on for `settle_s`; where it has started anew meanwhile, that is sent again.
+in the ring until the server has lived on for `settle_s`; where it has started again meanwhile, that is sent once more.
 """  # noqa: E501 — the address
 
 import logging

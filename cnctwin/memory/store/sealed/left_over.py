@@ -1,7 +1,7 @@
 """Sealed files that the manifest does not name: which of them say nothing that is not here anyhow, and may go.
 
 A kill leaves two kinds: a file that was written, and its transaction not; and one that another has taken the place of. In a
-folder whose database is an older copy, or was begun anew by a program that could not read sealed hours, there are others, and
+folder whose database is an older copy, or was begun again by a program that could not read sealed hours, there are others, and
 those are all that is left of their hours.
 """
 
@@ -48,7 +48,7 @@ class LeftOver:
             machine, stored_class, from_ms, to_ms = (about[key] for key in ("machine", "class", "from_ms", "to_ms"))
         except (OSError, pa.ArrowException, KeyError, TypeError, ValueError, IndexError):
             return False
-        if stored_class == StoredClass.ROLLUP:  # is made anew of the hours
+        if stored_class == StoredClass.ROLLUP:  # is made again of the hours
             return any(self._named(machine, from_ms, to_ms, of)[1] for of in (StoredClass.RAW, StoredClass.TWIN))
         samples, newest = self._named(machine, from_ms, to_ms, stored_class)
         if number < newest:

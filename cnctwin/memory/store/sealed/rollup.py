@@ -105,7 +105,7 @@ def _read(checked: Checked, rolled: Iterable[File]) -> Iterator[Minute]:
 
 
 def roll_up(db: sqlite3.Connection, answers: SealedAnswers, checked: Checked, machine: tuple[int, str], day: int) -> list[str]:
-    """Write the roll-up of a day anew, within a transaction; names of files that are not needed any more."""
+    """Write the roll-up of a day again, within a transaction; names of files that are not needed any more."""
     number, name = machine
     job = Job(number, day * DAY_MS, (day + 1) * DAY_MS)
     there = files(db, number, job.from_ms, job.to_ms)

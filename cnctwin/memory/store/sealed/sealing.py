@@ -2,7 +2,7 @@
 
 An hour is due when it is over and nothing came into it for the margin, by the clock of arrival: a recording of years ago that is
 replayed is not sealed while it plays. Hours with little in them wait for others of their day, so that a file is worth its footer.
-What comes late for a sealed hour waits in SQLite, and is merged by writing that hour's file anew.
+What comes late for a sealed hour waits in SQLite, and is merged by writing that hour's file again.
 """
 
 import json

@@ -102,7 +102,7 @@ app.replaceShown = (hash) => {
   shown = hash;
 };
 
-/** Opens the present view anew: its machine has come, or it was asked for. */
+/** Opens the present view again: its machine has come, or it was asked for. */
 app.reopen = () => {
   shown = null;
   route();

@@ -143,7 +143,7 @@ export class Machine {
     if (!this.online && heard >= 0 && !column.signal.startsWith(TWIN_PREFIX)) this.setOnline(false, times[heard]);
   }
 
-  /** Nothing was heard since `t`: lines end there, until they are filled up from the store or told anew. */
+  /** Nothing was heard since `t`: lines end there, until they are filled up from the store or told again. */
   hole(t) {
     for (const series of this.series.values()) series.hole(t);
   }
@@ -197,7 +197,7 @@ export class Plant {
     return [...this.machines.keys()].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
   }
 
-  /** The whole fleet anew: `/machines`. */
+  /** The whole fleet again: `/machines`. */
   fleet(items, { adds = false } = {}) {
     const named = new Set(items.map((item) => item.machine));
     if (!adds) for (const name of [...this.machines.keys()]) if (!named.has(name)) this.machines.delete(name);

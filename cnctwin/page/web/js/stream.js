@@ -1,4 +1,4 @@
-// The one stream that is open, and whether it lives. EventSource begins anew by itself after most failures, but not after an HTTP
+// The one stream that is open, and whether it lives. EventSource begins again by itself after most failures, but not after an HTTP
 // error, and it does not notice a connection that is dead without being closed; so there is a watchdog beside it.
 //
 // link: "connecting" never heard yet · "live" heard within SILENT_MS · "lost" nothing since · "broker" the API lives, its broker does not
@@ -47,7 +47,7 @@ export class Stream extends EventTarget {
     if (this.link === "live" || this.link === "broker") this.#say(isLost ? "broker" : "live");
   }
 
-  /** Begins anew, at once. */
+  /** Begins again, at once. */
   restart() {
     this.tries = 0;
     this.#connect();
@@ -71,7 +71,7 @@ export class Stream extends EventTarget {
     try {
       data = JSON.parse(text);
     } catch {
-      return; // half a message of a server that dies; the stream begins anew by itself
+      return; // half a message of a server that dies; the stream begins again by itself
     }
     const silentMs = this.heardMs === null ? 0 : performance.now() - this.heardMs;
     this.heardMs = performance.now();

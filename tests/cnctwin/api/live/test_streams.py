@@ -104,7 +104,7 @@ def test_a_stream_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch, mosq
 
 
 def has_read(reader: Stream, load: float) -> bool:
-    """Whether the reader's last rows begin with this load."""
+    """Return whether the reader's last rows begin with this load."""
     rows = reader.last("rows").get("rows")
     return bool(rows) and rows[0][1:3] == [LOAD, load]
 

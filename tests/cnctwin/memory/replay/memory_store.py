@@ -41,5 +41,5 @@ class MemoryStore:
 
 
 def is_hole(event: HostEvent) -> bool:
-    """Whether messages of a node were lost."""
+    """Return whether messages of a node were lost."""
     return event.kind is EventKind.HOLE

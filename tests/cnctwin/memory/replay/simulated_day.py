@@ -53,7 +53,7 @@ class Living:
         return [HostEvent(EventKind.DEATH, self.node, name, at_ms, (), "edge node offline") for name in self._declared]
 
     def turn(self, now_s: float) -> list[HostEvent]:
-        """What it publishes in one round of its loop."""
+        """Return what it publishes in one round of its loop."""
         actions: list[Action] = []
         due = [event for at_s, event in self.waiting if at_s <= now_s]
         self.waiting = [(at_s, event) for at_s, event in self.waiting if at_s > now_s]

@@ -1,4 +1,4 @@
-"""Clocks that stand in the past or run ahead, files that are gone, a database that is an old copy, damaged, or begun anew."""
+"""Clocks that stand in the past or run ahead, files that are gone, a database that is an old copy, damaged, or begun again."""
 
 import shutil
 import sqlite3

@@ -53,7 +53,7 @@ def cutting(feed: float, rpm: float, depth: float, length_mm: float) -> Cutting:
 
 
 def rate(rpm: float) -> float:
-    """What a second costs at this speed."""
+    """Return what a second costs at this speed."""
     life_s = 60.0 * (TAYLOR_C / (math.pi * 6.0 * rpm / 1000.0)) ** (1.0 / TAYLOR_N)
     return float(LABOUR + (TOOL_PRICE + TOOL_CHANGE_S * LABOUR) / life_s)
 

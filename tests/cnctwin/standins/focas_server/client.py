@@ -46,7 +46,7 @@ class RawClient:
         return head + self._read(int.from_bytes(head[8:10], "big")) if len(head) == 10 else b""
 
     def is_hung_up(self) -> bool:
-        """Whether the server has closed the connection."""
+        """Return whether the server has closed the connection."""
         try:
             return self.socket.recv(1) == b""
         except ConnectionResetError:

@@ -19,7 +19,7 @@ from tests.cnctwin.standins.focas_server.moments import CHANGING, DESCRIPTION, S
 
 
 def soon(condition: object, timeout_s: float = 30.0) -> bool:
-    """Whether this comes true."""
+    """Return whether this comes true."""
     assert callable(condition)
     until_s = time.monotonic() + timeout_s
     while not condition() and time.monotonic() < until_s:

@@ -1,4 +1,4 @@
-"""The adapter is lost and comes back: everything unavailable, then its present values anew."""
+"""The adapter is lost and comes back: everything unavailable, then its present values again."""
 
 from pathlib import Path
 

@@ -163,7 +163,7 @@ def test_the_ledger_accounts_for_every_entry_of_the_recording(agent: ReplayAgent
 
 
 def _said(observation: ElementTree.Element) -> Said:
-    """What an observation says: everything but sequence number, stamp and asset hash."""
+    """Return what an observation says: everything but sequence number, stamp and asset hash."""
     left_out = {"sequence", "timestamp", "hash"}
     attributes = tuple(sorted((k, v) for k, v in observation.attrib.items() if k not in left_out))
     entries = tuple((e.attrib["key"], e.get("removed", ""), e.text or "") for e in observation)

@@ -46,7 +46,7 @@ def state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def written(file: Path, count: int) -> bool:
-    """Whether so many writes of clients have been counted, in a while."""
+    """Return whether so many writes of clients have been counted, in a while."""
     deadline_s = time.monotonic() + 60.0
     while json.loads(file.read_text())["writes"] != count:
         if time.monotonic() > deadline_s:

@@ -19,7 +19,7 @@ def simulation() -> Simulation:
 
 
 def course(part: Part, key: str) -> list[tuple[float, str]]:
-    """What one key says, and when it says something new."""
+    """Return what one key says, and when it says something new."""
     told = [(moment.at_s, moment.values[key]) for moment in part.moments if key in moment.values]
     return [(at_s, value) for n, (at_s, value) in enumerate(told) if n == 0 or told[n - 1][1] != value]
 

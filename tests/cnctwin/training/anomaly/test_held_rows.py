@@ -39,7 +39,7 @@ class Watching:
 def message_by_message(
     runs: dict[str, RunLog], model: Any, settings: dict[str, Any]
 ) -> dict[tuple[str, str], list[tuple[float, Any]]]:
-    """What the processor publishes where each row of the logs is a message of its own: by machine and metric."""
+    """Return what the processor publishes where each row of the logs is a message of its own: by machine and metric."""
     models = dict.fromkeys(runs, model)
     configuration = Configuration(Config, settings, name="joint_anomaly", reads=lambda config: scorings(config, models))
     engine, events = Engine(PROCESSOR, configuration), []

@@ -45,7 +45,7 @@ def said(name: str) -> tuple[tuple[list[float], list[object]], ...]:
 
 
 def context_of(name: str, at_s: float) -> tuple[object, ...]:
-    """What was last said before a tick."""
+    """Return what was last said before a tick."""
     return tuple(values[place - 1] if (place := bisect_left(times, at_s)) else None for times, values in said(name))
 
 

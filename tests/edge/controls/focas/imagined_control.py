@@ -17,7 +17,7 @@ T0_S = 1_700_000_000.0
 
 
 def shown(request: Request, otherwise: Mapping[str, Plain]) -> tuple[FocasValue, ...]:
-    """What a control shows that cuts, but for what is shown otherwise."""
+    """Return what a control shows that cuts, but for what is shown otherwise."""
     values: dict[str, str | int | float | None] = dict(
         zip((f"status.{word}" for word in STATUS_WORDS), (1, 3, 1, 0, 0, 0, 0), strict=True)
     )

@@ -136,7 +136,7 @@ class Hour:
         self._look_s: list[float] = []
 
     def shown(self, from_s: float, to_s: float) -> list[CodedState]:
-        """What the control showed between these times."""
+        """Return what the control showed between these times."""
         first = max(bisect_right(self._at_s, from_s) - 1, 0)
         return self.states[first : bisect_right(self._at_s, to_s) or 1]
 
@@ -149,7 +149,7 @@ class Hour:
         return self.looks[max(bisect_right(self._look_s, at_s + 0.002) - 1, 0)]
 
     def kinds(self) -> Counter[str]:
-        """How many episodes there were of each kind."""
+        """Return how many episodes there were of each kind."""
         return Counter(kind.partition(":")[0] for _, _, kind in self.episodes)
 
 

@@ -26,7 +26,7 @@ EVERY = [
 
 
 def given_by(request: Request, *data: str | int) -> Answer:
-    """What a call gives for blocks of these bytes, or codes."""
+    """Return what a call gives for blocks of these bytes, or codes."""
     plan = answers.exchange(request)
     assert plan is not None
     found = [Reply(one, b"") if isinstance(one, int) else Reply(0, bytes.fromhex(one)) for one in data]

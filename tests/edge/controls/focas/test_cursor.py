@@ -15,7 +15,7 @@ from sparkplug.quality import Quality
 from twin.vocabulary.signals import Kind
 
 T0_MS = 1_700_000_000_000
-REFUSED = "EW_NOOPT (6): the control has not got the option for this function"
+REFUSED = "EW_NOOPT (6): the control does not have the option for this function"
 IDENTITY = {
     "control.cnc_type": "31",
     "control.mt_type": "M",

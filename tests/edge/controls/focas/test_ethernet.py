@@ -138,7 +138,7 @@ def answering(reply: Callable[[bytes], bytes]) -> Iterator[int]:
 
 
 def real_control(asked: bytes) -> bytes:
-    """What real controls answered, as it was captured; who is there is put together from two of them."""
+    """Return what real controls answered, as it was captured; who is there is put together from two of them."""
     if asked[6:8] == b"\x01\x01":
         return wire.MAGIC + bytes.fromhex("0004010200020000")
     if asked[6:8] == b"\x02\x01":

@@ -104,7 +104,7 @@ class Run:
         return found
 
     def unseen(self, change: ToolChange) -> bool:
-        """Whether the edge had a hole around that change, or said that it does not know."""
+        """Return whether the edge had a hole around that change, or said that it does not know."""
         blind = [(from_s, to_s) for from_s, to_s, _ in self.holes] + self.unknown()
         return any(a < change.to_s + 1.0 and change.from_s - 1.0 < b for a, b in blind)
 

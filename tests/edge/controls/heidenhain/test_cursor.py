@@ -45,7 +45,7 @@ class Player:
         return given
 
     def values(self, name: str) -> list[object]:
-        """What was published of a signal."""
+        """Return what was published of a signal."""
         return [sample.value for sample in self.published if sample.signal == name]
 
 

@@ -150,7 +150,7 @@ def test_t_ok_goes_out_only_as_the_call_for_the_next_part_of_a_file() -> None:
 
 
 def answered(answer: bytes, *, then_close: bool = False, pause_s: float = 0.0, patience_s: float = 60.0) -> bytearray:
-    """What the link makes of these bytes in answer to R_RI."""
+    """Return what the link makes of these bytes in answer to R_RI."""
     near, far = socket.socketpair()
     link = ReadOnlyLink("", 0, logins=LOGINS, patience_s=patience_s, clock=time.monotonic, pylsv2=library())
     link._socket = near

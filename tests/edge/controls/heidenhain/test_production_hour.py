@@ -56,7 +56,7 @@ def test_that_nothing_is_known_is_said_only_while_the_control_refuses(run: Run) 
 
 
 def _is_true(run: Run, look: Look, sample: EdgeSample) -> bool:
-    """Whether the control showed this while the look was made."""
+    """Return whether the control showed this while the look was made."""
     at_s = sample.timestamp_ms / 1000 - SWITCHED_ON_S
     from_s, to_s = (look.from_s, look.to_s) if look.from_s <= at_s <= look.to_s else (at_s - 1.0, at_s + 1.0)
     shown = run.shown(from_s - 0.01, to_s + 0.01)

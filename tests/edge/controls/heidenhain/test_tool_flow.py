@@ -12,7 +12,7 @@ from tests.edge.controls.heidenhain.test_klartext import program_of
 
 
 def tools(*blocks: str) -> list[set[object]]:
-    """What reaches each of these blocks."""
+    """Return what reaches each of these blocks."""
     flow = flow_of(program_of(*blocks), tool_of)
     assert not flow.fault
     return [set(flow.at(number)) for number in range(1, len(blocks) + 1)]

@@ -71,7 +71,7 @@ class Hour:
     reconnects: int = 0
 
     def kinds(self) -> Counter[str]:
-        """How many episodes there were of each kind."""
+        """Return how many episodes there were of each kind."""
         return Counter(episode.name.partition(":")[0] for episode in self.episodes)
 
 
@@ -248,7 +248,7 @@ class Shop:
             self._server.start()
 
     def restart(self) -> None:
-        """The agent begins anew, as another instance."""
+        """The agent begins again, as another instance."""
         with self.agent.changed:
             self._collect()
             self.agent.restart()

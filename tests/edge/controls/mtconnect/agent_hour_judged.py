@@ -56,7 +56,7 @@ def told_by_key(hour: Hour) -> Told:
 
 
 def _texts(told: Told, key: str, at_ms: int) -> set[str]:
-    """What stood at this time; several where several were told in one millisecond."""
+    """Return what stood at this time; several where several were told in one millisecond."""
     after = bisect_right(told[key], (at_ms, "\uffff"))
     last = told[key][max(after - 4, 0) : after]
     return {text for told_ms, text in last if told_ms == at_ms} or {last[-1][1]}

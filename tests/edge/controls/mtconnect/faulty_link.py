@@ -47,11 +47,11 @@ class Passing:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing gets through any more."""
+        """Return whether nothing gets through any more."""
         return self._bytes == 0
 
     def take(self, piece: bytes) -> bytes:
-        """What of it gets through."""
+        """Return what of it gets through."""
         passed = piece[: self._bytes]
         self._bytes = None if self._bytes is None else self._bytes - len(passed)
         return passed

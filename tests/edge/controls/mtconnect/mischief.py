@@ -75,7 +75,7 @@ def slow(chance: random.Random) -> Episode:
 
 
 def partial(chance: random.Random) -> Episode:
-    """What comes is cut into small pieces, or the connection ends in the middle of one."""
+    """Return what comes is cut into small pieces, or the connection ends in the middle of one."""
     if chance.random() < 0.5:
         pieces = Fault(piece_bytes=chance.choice([17, 101, 333]))
         return Episode("partial: pieces", chance.uniform(2.0, 10.0), 0.02, _broken(pieces, cuts=False))

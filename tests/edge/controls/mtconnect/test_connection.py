@@ -286,7 +286,7 @@ def test_a_stream_says_where_it_waits_and_before_what_it_blocks() -> None:
                     time.sleep(0.01)
             if told.count("blocks") == 3:
                 break
-        assert reader.connection.reconnects == 0, "it connects anew only when it is told to go on"
+        assert reader.connection.reconnects == 0, "it connects again only when it is told to go on"
     assert "waits" in told
     assert [one for one in told if one != "waits"] == ["frame", "blocks"] * 3
 

@@ -1,4 +1,4 @@
-"""An hour of production with tool changes, read from a real agent over real HTTP, while the agent is killed, started anew, hung,
+"""An hour of production with tool changes, read from a real agent over real HTTP, while the agent is killed, started again, hung,
 slow and wrong. In the suite ten minutes; the whole hour, streaming and polled, with CNCTWIN_FULL=1.
 """
 

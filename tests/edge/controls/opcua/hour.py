@@ -160,7 +160,7 @@ class Hour:
         self._settled_s = self._wall_s()
 
     def truth(self) -> tuple[list[ControlState], list[ToolChange]]:
-        """What the machine really showed, and changed."""
+        """Return what the machine really showed, and changed."""
         states = list(production(self.seconds))
         return states, [change for change in tool_changes(states) if change.to_s < self.control.machine_s - 10.0]
 

@@ -39,7 +39,7 @@ class Notification:
 
     @property
     def news(self) -> list[str]:
-        """What is new in it: firing, raised, repeat, resolved, passed."""
+        """Return what is new in it: firing, raised, repeat, resolved, passed."""
         return sorted(said.split(".")[2] for said in self.says if said.count(".") == 4)
 
 

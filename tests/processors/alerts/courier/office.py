@@ -63,7 +63,7 @@ class Office:
         return self._host.online
 
     def outbox(self) -> dict[str, bytes]:
-        """What is in the outbox now."""
+        """Return what is in the outbox now."""
         topics = self.topics.copy()  # the thread goes on reading
         return {topic: payload for topic, payload in topics.items() if topic.startswith(OUTBOX)}
 

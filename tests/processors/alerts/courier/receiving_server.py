@@ -94,7 +94,7 @@ class ReceivingServer:
         return f"http://127.0.0.1:{self.port}"
 
     def ids(self) -> Counter[str]:
-        """How often each notification came."""
+        """Return how often each notification came."""
         with self._lock:
             return Counter(one.id for one in self.received)
 

@@ -57,7 +57,7 @@ class Program(NamedTuple):
 
 
 def find() -> Program | None:
-    """Where rs274 is on this machine."""
+    """Return where rs274 is on this machine."""
     named = os.environ.get("CNCTWIN_RS274") or shutil.which("rs274")
     if not named:
         return None
@@ -81,7 +81,7 @@ def required() -> Program:
 
 
 def run(program: Program, text: str) -> str | None:
-    """What it prints for a part program; None where it does not reach the end of it."""
+    """Return what it prints for a part program; None where it does not reach the end of it."""
     with tempfile.TemporaryDirectory() as folder:
         source, tools = Path(folder) / "program.ngc", Path(folder) / "tool.tbl"
         source.write_text(text)

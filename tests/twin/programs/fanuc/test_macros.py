@@ -12,7 +12,7 @@ from twin.programs.fanuc.interpreter import interpret
 
 
 def value(expression: str, before: str = "", settings: Settings | None = None) -> float:
-    """What an expression comes to, by way of a position."""
+    """Return what an expression comes to, by way of a position."""
     (move,) = interpret(f"{before}\nG0 X[{expression}]", settings)
     assert isinstance(move, Rapid)
     return move.end_mm[0]

@@ -27,7 +27,7 @@ from twin.programs.fanuc.interpreter import interpret
 
 
 def ends(moves: list[Move]) -> list[tuple[float, ...]]:
-    """Where each motion ends, to a nanometre."""
+    """Return where each motion ends, to a nanometre."""
     return [tuple(round(a, 6) + 0.0 for a in move.end_mm) for move in moves if isinstance(move, Rapid | Linear | Arc)]
 
 

@@ -24,7 +24,7 @@ TOLERANCE_INCH_MM = 0.003  # rs274 prints four decimals of an inch.
 
 
 def compared(text: str) -> tuple[int, str | None] | None:
-    """How many moves, and the first difference; None where one of the two refuses the program."""
+    """Return how many moves, and the first difference; None where one of the two refuses the program."""
     printed = rs274.run(rs274.required(), text)
     if printed is None:
         return None

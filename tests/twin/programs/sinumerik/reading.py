@@ -16,7 +16,7 @@ def rounded(figures: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def ends(moves: list[Move]) -> list[tuple[float, ...]]:
-    """Where each motion ends."""
+    """Return where each motion ends."""
     return [rounded(move.end_mm) for move in moves if isinstance(move, Rapid | Linear | Arc)]
 
 

@@ -9,7 +9,7 @@ BEFORE = "G17 G90 S500 M3 F200\nG0 Z20\n"
 
 
 def at_hole(cycle: str, before: str = BEFORE) -> list[Move]:
-    """What a cycle makes, without what stands before it."""
+    """Return what a cycle makes, without what stands before it."""
     line = before.count("\n")
     return [move for move in run(before + cycle) if move.line == line]
 

@@ -15,7 +15,7 @@ ROUNDING_MM: Final = 1e-9
 
 
 def height(state: State) -> float:
-    """Where the tool is along its axis."""
+    """Return where the tool is along its axis."""
     return state.frame.to_program(state.position)[state.normal]
 
 

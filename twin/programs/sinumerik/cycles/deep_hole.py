@@ -104,7 +104,7 @@ def deep_hole(state: State, given: Arguments) -> None:
 
 
 def limit_distance(total: float) -> float:
-    """How far above the last depth rapid ends.
+    """Return how far above the last depth rapid ends.
 
     >>> limit_distance(20.0), limit_distance(100.0), limit_distance(1000.0)
     (0.6, 2.0, 7.0)

@@ -1,4 +1,5 @@
-"""What milling cycles share: a shape's own coordinates, equal infeeds, the direction of milling, and rings around a shape.
+"""Describe what milling cycles share: a shape's own coordinates, equal infeeds, the direction of milling, and rings around a
+shape.
 
 The way inside a shape is the control's own, and only described in words: from the middle outwards, in steps of equal width. The
 rings here follow that description; the last one is the contour itself, exact.

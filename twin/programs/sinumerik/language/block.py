@@ -72,7 +72,7 @@ def leading_number(reader: Reader) -> int | None:
 
 
 def statement(reader: Reader) -> Statement:
-    """What stands behind number and label."""
+    """Return what stands behind number and label."""
     if reader.done:
         return Nothing()
     first = reader.tokens[reader.at]
@@ -162,7 +162,7 @@ def addressed(token: Token) -> Part:
 
 
 def equated(reader: Reader, token: Token) -> Part:
-    """What stands behind `=`."""
+    """Return what stands behind `=`."""
     extended = EXTENDED.fullmatch(token.name)
     if extended is not None and extended[1] == "R":
         return assigned(reader, Variable("R", (constant(float(extended[2])),), token.text))

@@ -35,7 +35,7 @@ def is_true(value: Value, word: str) -> bool:
 
 
 def as_text(value: Value) -> str:
-    """What `<<` makes of a value: whole numbers without a point.
+    """Return what `<<` makes of a value: whole numbers without a point.
 
     >>> as_text(5.0), as_text(2.5), as_text("A")
     ('5', '2.5', 'A')

@@ -1,4 +1,4 @@
-"""What a block can be, once read: a list of parts that work together, or one statement that leads the program."""
+"""Describe what a block can be, once read: a list of parts that work together, or one statement that leads the program."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -89,7 +89,8 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where a jump goes: a label, a block number, or a text made when it is run. direction: GOTOF, GOTOB, GOTO, GOTOC, GOTOS."""
+    """Says where a jump goes: a label, a block number, or a text made when it is run. direction: GOTOF, GOTOB, GOTO, GOTOC,
+    GOTOS."""
 
     direction: str
     label: str = ""

@@ -98,7 +98,7 @@ export function open(app) {
   };
 }
 
-/** One job; it is written anew only where something is another. */
+/** One job; it is written again only where something is another. */
 class Card {
   constructor(app, job, changed) {
     Object.assign(this, { app, id: job.id, changed, shown: "", loaded: false });

@@ -28,7 +28,7 @@ export function open(app, { machine: named, search }) {
   if (name === null) return noMachine(app, "Machine", "A machine appears as soon as its edge says that it is there.");
   const element = el("div", { class: "view machine-view" });
   const machine = app.plant.machine(name);
-  machine.series.clear(); // what was kept for the fleet has holes: it is filled up anew
+  machine.series.clear(); // what was kept for the fleet has holes: it is filled up again
   const head = machineHead(app, machine, "machine");
   const stop = new AbortController(),
     line = loopLine(app, name),

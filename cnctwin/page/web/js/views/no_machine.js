@@ -1,4 +1,4 @@
-// A view of one machine while there is none; it opens anew as soon as there is one.
+// A view of one machine while there is none; it opens again as soon as there is one.
 
 import { el } from "../dom.js";
 

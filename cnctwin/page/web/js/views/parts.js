@@ -93,7 +93,7 @@ function figures(found) {
   ];
 }
 
-/** A part's record in a row (docs/reference/part_record.schema.json); what it has not got is a dash, with the reasons at its end. */
+/** A part's record in a row (docs/reference/part_record.schema.json); what it does not have is a dash, with the reasons at its end. */
 function recordRow(record) {
   const cycle = record.cycle?.cycle_time_s,
     force = Math.max(...list(record.tools).map((tool) => tool?.force_n?.max ?? -Infinity)),

@@ -16,7 +16,7 @@ const BUSY = ["composing", "diagnosing"];
 const route = (name, deed = null) => ["twin", part(name), deed].filter(Boolean).join("/");
 const signature = () => me.user ?? "the page";
 
-/** A place whose content is written anew only where what it shows is another. */
+/** A place whose content is written again only where what it shows is another. */
 function slot(render) {
   const host = el("div", { class: "slot" });
   let key = "";

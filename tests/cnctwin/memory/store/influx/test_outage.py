@@ -69,7 +69,7 @@ def until(condition: Callable[[], bool], timeout_s: float = 90.0) -> None:
 
 
 def numbers_kept(store: ServerStore, machine: str, samples: int) -> list[float]:
-    """What the server holds of the numbered samples, raw."""
+    """Return what the server holds of the numbered samples, raw."""
     [column] = store.query(Query(machine, ("spindle_rpm",), T0_MS, T0_MS + samples * EVERY_MS))
     assert column.t_us == sorted(set(column.t_us)), "each time once"
     return [float(value) for value in column.value if isinstance(value, int | float)]
@@ -105,7 +105,7 @@ def test_a_server_that_is_killed_and_cut_off_under_load_has_every_sample_once(se
 
 
 def _count(server: ServerProcess, machine: str) -> int:
-    """How many samples the server itself counts."""
+    """Return how many samples the server itself counts."""
     base = f"http://127.0.0.1:{server.port}"
     if isinstance(server, VictoriaMetrics):
         server.flush()

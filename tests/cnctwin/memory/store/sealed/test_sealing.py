@@ -128,7 +128,7 @@ def test_two_readers_see_each_sample_once_while_it_is_sealed(tmp_path: Path, mon
         looker.start()
     for hour in range(1, 5):
         store.tidy(T0_MS + hour * HOUR_MS + 600_000)
-        store.append(steady((hour - 1) * HOUR_MS + 250, 1))  # the sealed hour is written anew for it
+        store.append(steady((hour - 1) * HOUR_MS + 250, 1))  # the sealed hour is written again for it
         wanted += 1
     store.tidy(T0_MS + 30 * HOUR_MS)
     stop.set()
