@@ -22,7 +22,7 @@ CNC, PMC = 1, 2
 ALL = -1
 SPINDLE_SLOTS = 8
 LEFT_OVER = b"\x20"
-"""The bytes where there is no axis: the answer has room for all axes, and for a missing one it holds whatever was there before."""
+"""The bytes where there is no axis: the answer has room for all axes, and for a missing one it holds what was there before."""
 MACROS_MAX = 100
 ALARM_TEXT_BYTES_MAX = 64
 MESSAGE_BYTES_MAX = 256
