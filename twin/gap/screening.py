@@ -91,8 +91,8 @@ class Guess:
 def guesses(stage: Stage, parent: Fitted, effected: Effected, left: Unexplained) -> tuple[Guess, ...]:
     """Return where to start the parameters of an effect, best first.
 
-    Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; angles by a
-    pair of signatures a quarter of a turn apart; shapes, and what is infinite where there is no effect, over a grid. A size that
+    Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; an angle by
+    two signatures 90° apart; shapes, and what is infinite where there is no effect, over a grid. A size that
     the recordings suggest is started from as it is, and counts with the part of it that fits best.
     """
     free = effect_parameters(effect_named(effected.effect))

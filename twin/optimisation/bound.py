@@ -1,9 +1,9 @@
 """The bound that no program within the limits can beat, so that an answer states its distance to it and not only its gain.
 
-Time: every line at the highest feed of any speed it may have, on axes with their limits, while speeds change for nothing; but
+Time: every line at the highest feed of any speed it may have, on axes with their limits, a change of speed taking no time; but
 lines that share a speed have one, and a spindle that starts from rest has to ramp up to that of the line it starts for. Cost:
 the sum of what each group of lines costs by itself at its best, or what that time costs by labour and the tools of each group at
-their best, whichever is more. Where the control is ideal (length over feed, speeds that change for nothing) a program reaches it.
+their best, whichever is more. Where the control is ideal (length over feed, no time for a change of speed) a program reaches it.
 """
 
 from collections.abc import Callable
