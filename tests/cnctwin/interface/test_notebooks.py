@@ -64,7 +64,7 @@ def test_each_says_who_it_is_for_and_what_one_sees(name: str) -> None:
     assert first.cell_type == "markdown" and first.source.startswith("# ")
     assert "For whoever" in first.source and "What you will see:" in first.source
     page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
-    assert f"(notebooks/{name}.ipynb)" in page
+    assert f"notebooks/{name}.ipynb)" in page
 
 
 @pytest.mark.broker
