@@ -28,10 +28,10 @@ def loop(machine: str, step: str, *, revealed: bool = False, ready: bool = True,
     now = now_ms()
     tried = step == "shadow"
     texts = {
-        "watching": "the gap of the temperature is open at 6.1 × the repeatability since 12:03",
+        "watching": "the gap of the temperature is open at 6.1 floors since 12:03",
         "composing": "the last 104 s are cut out of the history",
         "diagnosing": "14 of 24 effects are tried on the heat",
-        "shadow": "the challenger runs beside the live twin, and its gap is 1.1 × the repeatability",
+        "shadow": "the challenger runs beside the live twin, and its gap is 1.1 floors",
         "promoted": "the challenger is live, and the gap is closed",
         "refused": "no effect explains the gap; the live twin stays",
     }
@@ -45,7 +45,7 @@ def loop(machine: str, step: str, *, revealed: bool = False, ready: bool = True,
         "gap_after": 1.12,
     }
     promoted = {
-        "text": "coolant cools: gap of the temperature 6.1 → 1.1 × the repeatability",
+        "text": "coolant cools: gap of the temperature 6.1 → 1.1 floors",
         "before": 6.1,
         "after": 1.1,
         "since": now - 30_000,
