@@ -101,7 +101,7 @@ def test_a_section_of_which_a_part_is_told_is_counted_by_its_constants() -> None
         ),
         (LINES[0], '"spindle" = { range = [0.5, 0.8], source = "x" }', "assumed: spindle is no number, so it has no range"),
         (LINES[0], '"spindle.efficiency" = { range = [0.9, 0.8], source = "x" }', "its lowest at or above its highest"),
-        (LINES[0], '"spindle.efficiency" = { range = [0.75, 0.92] }', "assumed.spindle.efficiency.source: Field required"),
+        (LINES[0], '"spindle.efficiency" = { range = [0.75, 0.92] }', "assumed.spindle.efficiency.source is missing"),
         (
             LINES[2],
             '"axes.b.inertia_kg_m2" = { range = [3.0, 6.0], source = "x" }',

@@ -121,7 +121,7 @@ def test_each_key_of_an_axis_has_one_name_outside_and_comes_back() -> None:
     ("written", "instead", "said"),
     [
         ("inertia_kg_m2 = 2.5\n", "", "axes.b.inertia_kg_m2 is missing"),
-        ("inertia_kg_m2 = 2.5", "inertia_kg_m2 = -2.5", "axes.b.inertia_kg_m2 = -2.5: should be"),
+        ("inertia_kg_m2 = 2.5", "inertia_kg_m2 = -2.5", "axes.b.inertia_kg_m2 = -2.5: must be"),
         ("coulomb_nm = 14.0", "coulomb_nm = 24.0", r"static_nm \(18.0, 18.5\) is below coulomb_nm 24.0"),
         ("coulomb_nm = 14.0", "coulomb_n = 14.0", "inertia_kg_m2 of a rotary axis and coulomb_n of a linear one"),
         ("torque_per_command_nm = 12.0\n", "", "axes.b: state torque_per_command_nm"),

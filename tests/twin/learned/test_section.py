@@ -74,7 +74,7 @@ def test_a_table_over_the_time_of_runs_is_kept_and_is_no_law() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("'axis_force'", "'nowhere'", "effects.1.site = 'nowhere': should be 'controller'"),
+        ("'axis_force'", "'nowhere'", "effects.1.site = 'nowhere': must be 'controller'"),
         ("position_mm", "colour", "effects.1: the learned term at axis_force on x: .* cannot depend on 'colour'"),
         ("[2.5, 0.0]", "[2.5]", "columns of the table have position_mm 1, value 2, low 2, high 2 rows"),
         ("[2.5, 0.0]", "[2.5, nan]", "position_mm of the table is nan in row 2; it has to be a finite number"),

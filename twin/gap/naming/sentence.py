@@ -123,4 +123,4 @@ def _in_words(effect: str, on: str) -> str:
 def figure_of(interval: Interval) -> str:
     """A figure with the half of its interval, as sentences have it."""
     half = (interval.high - interval.low) / 2.0
-    return f"{interval.value:.3g} ± {half:.1g} {interval.unit}".strip()
+    return f"{interval.value:.3g} ± {float(f'{half:.1g}'):g} {interval.unit}".strip()

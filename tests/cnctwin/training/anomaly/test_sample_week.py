@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cnctwin.commands.train.app import train_app
 from typer.testing import CliRunner
 
+from cnctwin.commands.learn.train.app import train_app
 from cnctwin.training.anomaly.recorded_cell import shared_features
 from cnctwin.training.anomaly.train import FEATURES
 from twin.runlog import RunLog, read_run
