@@ -5,6 +5,7 @@ declaration in `processor.py`. Nothing is registered by being imported.
 """
 
 import importlib
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,8 @@ def discover() -> dict[str, AnyProcessor]:
 def module_of(name: str) -> str:
     """The module that declares the processor `name`, not imported. Raises UnknownProcessorError."""
     if name not in modules():
-        raise UnknownProcessorError(f"no processor {name!r}; there are: {', '.join(modules())}")
+        near = "".join(f"did you mean {one}? " for one in get_close_matches(name, modules(), 1))
+        raise UnknownProcessorError(f"no processor {name!r}; {near}there are: {', '.join(modules())}")
     return modules()[name]
 
 
