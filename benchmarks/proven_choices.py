@@ -35,7 +35,7 @@ CONFIDENCE = 0.95
 
 
 class Choice(NamedTuple):
-    """Holds what a program says for a tool: spindle speed, and the feeds in mm/min of its cutting moves (from slow to fast)."""
+    """The choice of a program for a tool: spindle speed, and the feeds in mm/min of its cutting moves (from slow to fast)."""
 
     rpm: float
     feeds_mm_min: tuple[float, ...]

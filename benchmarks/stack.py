@@ -106,7 +106,7 @@ def pss_mb(pid: int) -> float:
 
 
 class PageReader(threading.Thread):
-    """Holds what a browser takes: the stream of the fleet and of one machine."""
+    """A reader like a browser: the stream of the fleet and of one machine."""
 
     def __init__(self, url: str) -> None:
         super().__init__(daemon=True)

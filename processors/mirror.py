@@ -48,7 +48,7 @@ class Config(ProcessorConfig):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Holds what of a machine is announced to Home Assistant: platform and id of each entity; nothing where it is not asked
+    """The entities of a machine announced to Home Assistant: platform and id of each entity; nothing where it is not asked
     for."""
 
     announced: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Describe what a session asks of its transport, and the message of a host application's STATE."""
+"""Actions that a session asks of its transport, and the message of a host application's STATE."""
 
 import json
 from typing import NamedTuple
@@ -64,7 +64,7 @@ Action = Acknowledge | Barrier | Publish | Subscribe | Disconnect | WalkToNextSe
 
 
 class HostState(NamedTuple):
-    """Says whether a host application is online, since when (ms since 1970, UTC)."""
+    """The state of a host application: online or not, since when (ms since 1970, UTC)."""
 
     online: bool
     timestamp_ms: int

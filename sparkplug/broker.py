@@ -1,4 +1,4 @@
-"""Describe where a broker is and how to get in."""
+"""The address of a broker, and the credentials for it."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path

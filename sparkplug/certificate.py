@@ -1,4 +1,4 @@
-"""Describe what a birth certificate declares: a table of metrics with their aliases, types and present values."""
+"""The contents of a birth certificate: a table of metrics with their aliases, types and present values."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress

@@ -35,7 +35,7 @@ Aliases = dict[tuple[str | None, str], int]
 
 
 class Phase(Enum):
-    """Says where a session stands."""
+    """The phase of a session."""
 
     OFFLINE = "offline"
     WAITING = "waiting"

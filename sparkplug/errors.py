@@ -1,4 +1,4 @@
-"""Describe what can go wrong in this package.
+"""Errors of this package.
 
 SparkplugError
 ├── TopicError            a topic or an id that the specification does not allow

@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Mark(Enum):
-    """Holds what stands in the inbox between messages."""
+    """A mark in the inbox between messages."""
 
     CONNECTED = "connected"
     LOST = "lost"

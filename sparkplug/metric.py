@@ -1,4 +1,4 @@
-"""Describe what an application declares, changes and reads; the wire forms are in `values`."""
+"""Metrics as an application declares, changes and reads them; the wire forms are in `values`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

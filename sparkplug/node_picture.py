@@ -1,4 +1,4 @@
-"""Describe what a host application knows of one edge node and its devices."""
+"""A host application's picture of one edge node and its devices."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ _PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN})
 
 
 class Binding(NamedTuple):
-    """Holds what the birth said of a metric: enough to read its data."""
+    """The declaration of a metric in its birth: enough to read its data."""
 
     name: str
     datatype: DataType

@@ -1,4 +1,4 @@
-"""Describe how far a value may be trusted (Sparkplug 3.0.0, 6.4.14: the property `Quality`)."""
+"""Trust in a value (Sparkplug 3.0.0, 6.4.14: the property `Quality`)."""
 
 from enum import IntEnum
 

@@ -1,4 +1,4 @@
-"""Describe how often a birth is repeated on request, and how often one is requested.
+"""Limits on how often a birth is repeated on request, and requested.
 
 Many hosts may miss the same birth at once. The edge answers all requests of a window with one birth; a host waits a moment
 before it asks, asks no more if a birth has come meanwhile, and waits longer each time that a node does not answer.

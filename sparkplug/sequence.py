@@ -23,7 +23,7 @@ class Numbered(NamedTuple):
 
 
 class Verdict(Enum):
-    """Holds what became of a message."""
+    """The verdict on a message."""
 
     TAKEN = "taken"
     HELD = "held"

@@ -1,4 +1,4 @@
-"""Describe what an instance of a template owes to its definition (Sparkplug 3.0.0, 6.4.15).
+"""Rules for an instance of a template and its definition (Sparkplug 3.0.0, 6.4.15).
 
 A birth carries every member of the definition, data may carry some of them; neither may carry a member or a parameter that the
 definition has not. The next birth is whole again: a part is merged into what was known.

@@ -81,7 +81,7 @@ class Template:
 
 @dataclass(frozen=True, slots=True)
 class MetaData:
-    """Holds what a BYTES or FILE value is (6.4.8)."""
+    """Metadata of a BYTES or FILE value (6.4.8)."""
 
     is_multi_part: bool | None = None
     content_type: str | None = None

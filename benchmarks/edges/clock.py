@@ -62,7 +62,7 @@ CASES = (
 
 
 class Estimate(NamedTuple):
-    """Holds what was published as of a moment, and the truth."""
+    """An estimate that was published at a moment, and the truth."""
 
     at_s: float
     offset_s: float

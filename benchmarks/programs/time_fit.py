@@ -48,11 +48,11 @@ START: dict[str, float] = {
     "tool_change_x": -150.0,
     "tool_change_y": -250.0,
 }
-"""What can be fitted, and where the search begins. All but the places are fields of `Limits`."""
+"""Parameters that can be fitted, and where the search begins. All but the places are fields of `Limits`."""
 PARAMETERS = tuple(
     name for name in START if name not in {"corner_deviation_mm", "jerk_mm_s3", "rapid_jerk_mm_s3", "block_time_s"}
 )
-"""What is fitted unless told otherwise: the others gained nothing on these recordings (docs/explanation/program-time.md)."""
+"""The parameters that are fitted by default: the others gained nothing on these recordings (docs/explanation/program-time.md)."""
 SPINDLE_BASE_RPM = 3000.0
 """Spindle motors give constant power from a quarter or so of their top speed on. Assumed where `spindle_ramp` has no run-ups."""
 

@@ -1,4 +1,4 @@
-"""Describe what all machines of a hall feel at once: each with its own strength, and a little later than its neighbour.
+"""Disturbances that all machines of a hall feel at once: each with its own strength, and a little later than its neighbour.
 
 | kind | what it does | a working day | lasts |
 |---|---|---|---|
@@ -25,7 +25,7 @@ OF_MACHINE, OF_EVENT = 0.35, 0.20
 
 
 class Kind(StrEnum):
-    """Holds what disturbs the hall."""
+    """The kind of a disturbance."""
 
     FORKLIFT = "forklift"
     PRESS = "press"
@@ -36,7 +36,9 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Sort:
-    """Says how often a working day, how long, how strong in the unit of its effect, how much later the last machine feels it."""
+    """The sort of a disturbance: how often a working day, how long, how strong in the unit of its effect, and the delay of
+    the last machine.
+    """
 
     a_day: float
     lasts_s: tuple[float, float]

@@ -1,4 +1,4 @@
-"""Describe what breaks in one machine, and how big "1" is. These sizes were written down before anything was judged by them.
+"""Faults of one machine, and how big "1" is. These sizes were written down before anything was judged by them.
 
 | kind | size 1 | comes | lasts |
 |---|---|---|---|

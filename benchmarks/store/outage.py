@@ -32,7 +32,7 @@ NODE = NodeId("cnc", "hall")
 
 
 class DeduplicatingVictoria(VictoriaMetrics):
-    """As docs/how-to/influx.md says."""
+    """Start the server as docs/how-to/influx.md describes."""
 
     deduplicates = True
 

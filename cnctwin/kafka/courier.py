@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class Startable(Protocol):
-    """Holds what is at work from `start` to `stop`, once."""
+    """A thing that works from `start` to `stop`, once."""
 
     def start(self) -> None: ...
 

@@ -39,16 +39,6 @@ class PlannedFile:
             yield from lines
 
 
-def text_of(path: Path) -> str | None:
-    """Return the text of a file; None where it is not there. Raises UsageError."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: cannot be read: {error}") from None
-
-
 def write_all(files: Sequence[PlannedFile]) -> None:
     """Write the files that change. What can fail is done under temporary names first. Raises UsageError."""
     ready: list[tuple[Path, Path]] = []

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from cnctwin.errors import UsageError
+from cnctwin.machines.disk import text_of
 from cnctwin.machines.starters import machine_classes, starter_text, title_of
 from cnctwin.processes.given_broker import BROKER_VARIABLE, PASSWORD_VARIABLE
 from cnctwin.running.plant_folder import PlantFolder, variables, with_variables
@@ -20,7 +21,7 @@ from cnctwin.setting_up.alert_trial import send_test
 from cnctwin.setting_up.broker_trial import try_broker
 from cnctwin.setting_up.control_trial import address_of, at_another_address, drafted, first_values, in_words
 from cnctwin.setting_up.dialog import Dialog
-from cnctwin.setting_up.planned_files import PlannedFile, text_of
+from cnctwin.setting_up.planned_files import PlannedFile
 from cnctwin.setting_up.toml_text import with_key
 from edge.state_dir import VARIABLE as STATE_VARIABLE
 from sparkplug.broker import BrokerAddress
@@ -66,7 +67,7 @@ WantedBy=default.target
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """Holds what the command line gives; None = it is asked for."""
+    """The answers that the command line gives; None = it is asked for."""
 
     control: str | None = None
     device: str = ""

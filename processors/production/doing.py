@@ -1,4 +1,4 @@
-"""Describe what a machine does at a moment, in the time elements of ISO 22400-2: production, setup, delay, down; or not known.
+"""The activity of a machine at a moment, in the time elements of ISO 22400-2: production, setup, delay, down; or not known.
 
 The execution state, its reasons and the runs are those of the processor `events`: one definition, folded here once more.
 """

@@ -1,4 +1,4 @@
-"""Describe what the columns of a recording say of each other, and where that can't be: another unit, another sign, a cut that
+"""Columns of a recording that contradict each other: another unit, another sign, a cut that
 isn't known.
 
 A column that cannot be what its name says is left out, and so is what depends on it: a force of the cut that nobody knows would

@@ -39,7 +39,7 @@ class Sides:
 
 @dataclass(frozen=True, slots=True)
 class Contrast:
-    """Says how far the two sides are apart. share: of the gap's energy; size in floors; p; says: both means in words."""
+    """The difference between two sides. share: of the gap's energy; size in floors; p; says: both means in words."""
 
     over: str
     share: float

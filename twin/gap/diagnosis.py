@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 class Verdict(StrEnum):
-    """Says how much of the gap the named causes are.
+    """The verdict: how much of the gap the named causes are.
 
     healthy: there is none beyond what repeated runs differ by; explained: what is left is no more than that; partly_explained:
     most of it is gone, and a remainder has no name; unknown: there is a gap, and nothing in the catalogue is its cause
@@ -62,7 +62,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Says how the gap of a signal goes with something: `over` position, lead phase, spindle phase, time, section, or a contrast.
+    """A pattern: a signal's gap goes with something, `over` position, lead phase, spindle phase, time, section, or a contrast.
 
     share: of the signal's gap energy that its means over the bins make up (of a contrast: that the difference makes up)
     effect_size: largest departure of a bin from the signal's mean, over the floor; significance, discovered: as of a Cell
@@ -269,7 +269,7 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosed:
-    """Holds what a diagnosis hands over: the answer, the twin with constants refitted and causes added, and what to look at."""
+    """The results of a diagnosis: the answer, the twin with constants refitted and causes added, and what to look at."""
 
     diagnosis: Diagnosis
     twin: MachineFile

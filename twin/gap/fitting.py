@@ -20,7 +20,7 @@ STEPS_WITHOUT = 14
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Left:
-    """Holds what a fitted hypothesis leaves on the runs that judge it, in floors.
+    """The gap that a fitted hypothesis leaves on the runs that judge it, in floors.
 
     squares: (blocks, signals) sums of the squared residual over floor²; counts: (blocks, signals) samples
     cells: (signals, regimes) sums of the squared residual over floor²; cell_counts: (signals, regimes) samples

@@ -1,4 +1,4 @@
-"""Describe what healthy machines show: how far a candidate seems to help where there is nothing to find.
+"""The null distribution of healthy machines: how far a candidate seems to help where there is nothing to find.
 
 Calibrated with the blind check's plant on healthy machines of other programs and other seeds than those it is judged on.
 """

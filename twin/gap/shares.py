@@ -1,4 +1,4 @@
-"""Describe how much of the gap each cause closes, so that the shares add up: Shapley's value over the sets of causes.
+"""Shares of the gap that each cause closes, which add up: Shapley's value over the sets of causes.
 
 share_i = Σ_S |S|! (n − |S| − 1)! / n! · (closed(S ∪ i) − closed(S))
 """

@@ -1,4 +1,4 @@
-"""Describe whether a gap is more than what repeats, for samples that are correlated in time, many cells at once.
+"""Tests whether a gap exceeds the repeatability, for samples that are correlated in time, many cells at once.
 
 A gap is given in floors, ρ = (twin − recording) / floor, so that what repeats has a mean of 0 and an rms of 1. n samples with an
 integral autocorrelation time τ = 1 + 2 Σ r_k are worth n / τ independent ones; the sum ends at the first lag M ≥ 5 τ(M) (Sokal

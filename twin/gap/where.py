@@ -1,4 +1,4 @@
-"""Describe where the gap lies: every signal in every regime, beside what repeats.
+"""The place of the gap: every signal in every regime, beside the repeatability.
 
 A cell is one signal in one regime over all runs that are looked at. With ρ = (twin − recording) / floor, its share of the gap is
 

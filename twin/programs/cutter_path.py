@@ -30,7 +30,7 @@ NEARLY_SMOOTH_RAD: Final = 0.035
 
 @dataclass(slots=True)
 class CompensatedSection:
-    """Holds what was put out since compensation was switched on, uncompensated.
+    """A stretch put out since compensation was switched on, uncompensated.
 
     offsets_mm: for each motion in `moves`, by its index, how far to the left the tool's centre goes; None: the tool leaves
     on, off: the words that switch it, as an error names them

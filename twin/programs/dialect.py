@@ -16,7 +16,7 @@ RECOGNISED_CHARACTERS_MAX: Final = 20_000
 
 
 class SourceWords(Protocol):
-    """Holds what the optimiser has to know of a line in this language. A module of functions with these names is one.
+    """The words of a line in this language that the optimiser needs. A module of functions with these names is one.
 
     A line comes without its end. Comments hold no words. Nothing here raises for a line that cannot be read: the interpreter,
     which runs first, names it.

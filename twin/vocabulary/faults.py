@@ -42,7 +42,7 @@ _WORDS: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "too_short": lambda c: _too_short(c, "entries"),
     "too_long": lambda c: f"has {c['actual_length']} entries; the limit is {c['max_length']}",
 }
-"""What is wrong, by pydantic's name of the fault, from its `ctx`."""
+"""Words for a fault by pydantic's name of it, filled from its `ctx`."""
 
 
 def faults_of(

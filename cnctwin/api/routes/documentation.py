@@ -13,7 +13,7 @@ POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
-"""What a page of the site may do: its theme keeps light or dark by a script in the page; nothing comes from elsewhere."""
+"""The site's Content-Security-Policy: its theme keeps light or dark by a script in the page; nothing comes from elsewhere."""
 NOT_BUILT = (
     '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>cnctwin</title></head><body>'
     "<h1>The documentation is not built here</h1><p>Run <code>scripts/docs</code> in the folder of the project, and load this "

@@ -16,7 +16,7 @@ _VARIABLE = re.compile(r"#([1-9]\d{0,4})")
 
 
 class Address(NamedTuple):
-    """Holds what is asked, and which bit of the answer counts (None: all of it)."""
+    """The address that is read, and the bit of the answer that counts (None: all of it)."""
 
     request: Request
     bit: int | None = None

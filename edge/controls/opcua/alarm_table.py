@@ -24,7 +24,7 @@ ALARMS_MAX = 256
 
 
 class Phase(StrEnum):
-    """Says how much is known of the alarms."""
+    """The phase of reading alarms: how much of them is known."""
 
     NONE = "none"  # no events are heard
     ASKED = "asked"  # the server was asked for the alarms that are there already

@@ -1,4 +1,4 @@
-"""Describe what a control keeps of the tool in the spindle, from tables that have a column for each tool.
+"""The data that a control keeps of the tool in the spindle, from tables that have a column for each tool.
 
 Such a node is another one for each tool, so it cannot be watched: it is read after each change of the tool, and now and then,
 since a tool's life goes on while it cuts.

@@ -22,7 +22,7 @@ SUFFIX = ".toml"
 
 
 class Form(BaseModel):
-    """Says how numbers, moments and durations are written. moment: as in strftime"""
+    """The form of numbers, moments and durations. moment: as in strftime"""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

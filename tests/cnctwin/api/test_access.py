@@ -1,4 +1,4 @@
-"""Who may ask: each rule of docs/reference/api.md, by itself and on the application."""
+"""Rights to ask: each rule of docs/reference/api.md, by itself and on the application."""
 
 import http.cookies
 import time

@@ -38,7 +38,7 @@ M30
 BACK_AND_FORTH = "G90 G94 G21\n" + "".join(f"G1 X{to}. F{feed}\n" for feed in (400, 6000) for to in (12, -12, 0))
 SERVO = ("x_ref_mm", "x_pos_mm", "x_torque_a")
 MASS, GAIN, FRICTION = 1.25, 0.9, 0.75
-"""What the machine is, over what its class says."""
+"""The machine's own constants, which stand over those of its class."""
 
 
 def starter(machine_class: str) -> MachineFile:

@@ -186,7 +186,7 @@ spindle_deceleration_rpm_s = 3100.0
 spindle_base_rpm = 3000.0
 rapid_waits_for_spindle = true
 """
-"""As docs/explanation/program-time.md has it, fitted to plates 13, 14 and 15."""
+"""The model of docs/explanation/program-time.md, fitted to plates 13, 14 and 15."""
 
 
 def test_recorded_plates_that_were_not_fitted_take_what_the_twin_says() -> None:

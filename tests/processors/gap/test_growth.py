@@ -24,7 +24,7 @@ def baseline_of(figures: list[float]) -> Baseline:
 
 
 def alarms(baseline: Baseline, rule: Rule, figures: list[float]) -> int:
-    """Of both sides of the chart, which begins again after each."""
+    """Return the alarms of both sides of the chart, which begins again after each."""
     chart, count = Chart(), 0
     for figure in figures:
         chart = charted(chart, rule, baseline, figure, 0.0)

@@ -1,4 +1,4 @@
-"""Describe what the recorded runs have already done, so that it is safe to do again: how far each axis went, how fast, what
+"""The envelope of the recorded runs, which is safe to repeat: how far each axis went, how fast, what
 was cut.
 
 A program that a diagnosis suggests stays within this: no axis leaves the box, none goes faster, nothing is cut that was not cut.

@@ -175,7 +175,7 @@ def _is_told(fitted: Fitted, name: str) -> bool:
 
 @dataclass(frozen=True)
 class _Chance:
-    """Says how much a healthy machine gives an effect to gain."""
+    """The gain that an effect has on a healthy machine by chance."""
 
     learnt: Sequence[Watched]
     judged: Sequence[Watched]

@@ -1,4 +1,4 @@
-"""Describe where the time gap lies: in which sections of the programs, and in what kind of blocks.
+"""The place of the time gap: in which sections of the programs, and in what kind of blocks.
 
 Seconds add up where other signals do not, so the share of a cell is that of its seconds: |Σ gap| over the same summed over all
 cells of its signal. `section_time_s` goes from one tool change to the next; `block_time_s` sorts windows of a second or so by

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class Form(Enum):
-    """Says how θ becomes a value."""
+    """The form in which θ becomes a value."""
 
     FACTOR = "factor"
     LINEAR = "linear"

@@ -56,7 +56,7 @@ class MFunction(NamedTuple):
 
 @dataclass(slots=True)
 class Block:
-    """Holds what stands in a path block.
+    """The contents of a path block.
 
     values: by name, incremental ones as IX; texts: as written; flags: words without a value
     compensation: R0, RL or RR; direction: of DR

@@ -21,7 +21,7 @@ NAMES: Final = ("CHF", "CHR", "RND")
 
 
 class Corner(NamedTuple):
-    """Holds what a block says of the corner behind it."""
+    """The corner behind a block, as the block programs it."""
 
     kind: str
     size_mm: float

@@ -1,4 +1,4 @@
-"""Describe where the axis words of a block go, and how a motion is put out."""
+"""Motion: the targets of a block's axis words, and the moves that come of them."""
 
 import math
 from typing import Final

@@ -67,7 +67,7 @@ def converted(kind: str, value: Value, word: str) -> Value:
 
 
 class Variables:
-    """Holds what the expressions of a running program read, and its assignments write."""
+    """The variables that expressions of a running program read and assignments write."""
 
     __slots__ = ("local", "r", "system")
 

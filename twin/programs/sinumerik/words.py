@@ -37,7 +37,7 @@ class Given:
 
 @dataclass(slots=True)
 class Words:
-    """Holds what a block says. codes: the G code of each group; written: the same as written; calls: subprograms and cycles."""
+    """The words of a block. codes: the G code of each group; written: the same as written; calls: subprograms and cycles."""
 
     codes: dict[str, str] = field(default_factory=dict)
     written: dict[str, str] = field(default_factory=dict)

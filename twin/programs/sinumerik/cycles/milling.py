@@ -1,4 +1,4 @@
-"""Describe what milling cycles share: a shape's own coordinates, equal infeeds, the direction of milling, and rings around a
+"""The geometry that milling cycles share: a shape's own coordinates, equal infeeds, the direction of milling, and rings around a
 shape.
 
 The way inside a shape is the control's own, and only described in words: from the middle outwards, in steps of equal width. The

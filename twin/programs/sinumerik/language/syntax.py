@@ -1,4 +1,4 @@
-"""Describe what a block can be, once read: a list of parts that work together, or one statement that leads the program."""
+"""The syntax of a block, once read: a list of parts that work together, or one statement that leads the program."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -89,7 +89,7 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Says where a jump goes: a label, a block number, or a text made when it is run. direction: GOTOF, GOTOB, GOTO, GOTOC,
+    """The target of a jump: a label, a block number, or a text made when it is run. direction: GOTOF, GOTOB, GOTO, GOTOC,
     GOTOS."""
 
     direction: str

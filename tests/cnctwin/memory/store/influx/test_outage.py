@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[5]
 
 
 class DeduplicatingVictoria(VictoriaMetrics):
-    """As docs/how-to/influx.md says that it should be started."""
+    """The server is started as docs/how-to/influx.md describes."""
 
     deduplicates = True
 

@@ -1,4 +1,4 @@
-"""What the ring and the sender do with a server that is away, refuses, or is started again."""
+"""The ring and the sender, with a server that is away, refuses, or is started again."""
 
 import threading
 import time
