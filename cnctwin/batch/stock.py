@@ -21,7 +21,7 @@ def with_stock(machine: MachineFile, text: str | None) -> MachineFile:
     edges = [edge.split(":") for edge in text.split(",")]
     try:
         if len(edges) != 3:
-            raise ValueError  # noqa: TRY301  a box has three edges, as each edge has two ends
+            raise ValueError
         lows, highs = zip(*((float(low), float(high)) for low, high in edges), strict=True)
         stock = Stock.model_validate({"min_mm": lows, "max_mm": highs})
     except ValidationError as error:

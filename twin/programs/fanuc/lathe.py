@@ -20,10 +20,6 @@ def refuse_lathe(text: str) -> None:
 
     A tool number of four digits counts only where no block has M6: a mill with so many tools changes them by it.
 
-    >>> refuse_lathe("G21 G99\\nT0101\\nG0 X52. Z2.")
-    Traceback (most recent call last):
-    ...
-    twin.errors.PartProgramError: line 2: T0101: belongs to a lathe ...
     >>> refuse_lathe("T0101 M6 (not G50 S2500)")
     """
     if MARKS.search(text) is None:
