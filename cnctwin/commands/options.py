@@ -65,6 +65,14 @@ StateDir = Annotated[
     typer.Option(help="State folder; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin", show_default=False),
 ]
 StateFile = Annotated[Path | None, typer.Option(help="Keep address and state in this JSON file", hidden=True)]
+StockBox = Annotated[
+    str | None,
+    typer.Option(
+        "--stock",
+        help="The block that is cut from, X0:X1,Y0:Y1,Z0:Z1, mm in machine coordinates, as 0:80,0:60,-20:0; else \\[stock]",
+        show_default=False,
+    ),
+]
 StorePlace = Annotated[
     str | None, typer.Option("--store", help="Folder or address of the store; else $CNCTWIN_STORE", show_default=False)
 ]

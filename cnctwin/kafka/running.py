@@ -1,6 +1,7 @@
 """A runner from its options: the consumer group's member, and beside alerts the courier that sends, where they are."""
 
 import logging
+import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -45,6 +46,7 @@ def run_over_kafka(
     is_alone = Request(lambda: refuse_overlap(settings, topics, [processor.name for processor, _ in pairs], stop))
     ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
     is_alone.answer()
+    print(started([processor.name for processor, _ in pairs], settings.bootstrap, group, member), file=sys.stderr, flush=True)
     with _courier(settings, topics, pairs, broker, member) as hold, _sink(pairs) as sink:
         while not stop.is_set():
             began_s = time.monotonic()
@@ -57,6 +59,16 @@ def run_over_kafka(
                     raise
                 _log.warning("%s; unless the cluster was away: this one comes in once more", error)
                 transactions = Transactions(settings, claimed.name, stop.is_set)
+
+
+def started(names: Sequence[str], bootstrap: str, group: str, member: str) -> str:
+    """Return the line that says what runs, what it reads and under which name.
+
+    >>> started(["gap"], "127.0.0.1:9092", "cnc", "left")
+    'started gap: member left reads the machines of group cnc (cnctwin.cnc.*) on Kafka at 127.0.0.1:9092; Ctrl-C ends it'
+    """
+    where = f"the machines of group {group} (cnctwin.{group}.*) on Kafka at {bootstrap}"
+    return f"started {', '.join(names)}: member {member} reads {where}; Ctrl-C ends it"
 
 
 @contextmanager

@@ -42,20 +42,26 @@ class LoopConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    diagnose: Diagnose = Diagnose.BY_ITSELF
-    window_hours: float = Field(default=8.0, gt=0.0, le=720.0, description="of history, where nothing says since when")
-    open_hours: Hours = Field(default=2.0, description="for which a gap is open before a diagnosis begins by itself")
+    diagnose: Diagnose = Field(
+        default=Diagnose.BY_ITSELF, description="`by_itself`: a gap that stays open is diagnosed; or `by_hand`"
+    )
+    window_hours: float = Field(default=8.0, gt=0.0, le=720.0, description="history in a case, where nothing says since when")
+    open_hours: Hours = Field(default=2.0, description="how long a gap is open before a diagnosis begins automatically")
     history_days: float = Field(default=30.0, gt=0.0, le=366.0, description="no case reaches further back")
-    again_hours: Hours = Field(default=24.0, description="after a diagnosis that led to nothing, before the next by itself")
-    shadow_s: float = Field(default=900.0, ge=0.0, le=31e6, description="beside the live one, without runs to score it on")
-    promote: Promote = Promote.BY_HAND
-    shadow_hours: Hours = Field(default=24.0, description="beside the live one, before the rule promotes")
-    promote_floors: Floors = Field(default=0.3, description="by which it has to be better, over all signals")
-    back_hours: Hours = Field(default=24.0, description="for which the gap is watched after a promotion")
-    back_floors: Floors = Field(default=0.5, description="by which it may be larger than before; more leads back")
-    cases_max: int = Field(default=5, ge=1, le=1000, description="that are kept of a machine")
-    programs: Path | None = Field(default=None, description="folder with the NC files that it runs")
-    ambient_c: float | None = Field(default=None, ge=-50.0, le=80.0, description="of the hall, where no signal tells it")
+    again_hours: Hours = Field(default=24.0, description="pause after a diagnosis that led to nothing")
+    shadow_s: float = Field(default=900.0, ge=0.0, le=31e6, description="time beside the live twin, without runs to score it on")
+    promote: Promote = Field(
+        default=Promote.BY_HAND, description="`by_hand`: a person promotes; or `by_rule`, after `shadow_hours`"
+    )
+    shadow_hours: Hours = Field(default=24.0, description="time beside the live twin, before the rule promotes")
+    promote_floors: Floors = Field(default=0.3, description="how much better it must be over all signals, × the repeatability")
+    back_hours: Hours = Field(default=24.0, description="how long the gap is watched after a promotion")
+    back_floors: Floors = Field(default=0.5, description="a gap larger by this, × the repeatability, takes a promotion back")
+    cases_max: int = Field(default=5, ge=1, le=1000, description="cases that are kept of a machine")
+    programs: Path | None = Field(default=None, description="folder with the NC files that the machine runs")
+    ambient_c: float | None = Field(
+        default=None, ge=-50.0, le=80.0, description="temperature of the hall, where no signal has it"
+    )
 
 
 class LoopConfiguration:

@@ -27,7 +27,7 @@ def _section(command: Any, names: list[str]) -> Iterator[str]:
         yield f"{'#' * min(len(names), 3)} {' '.join(names)}\n"
         if command.help:
             yield re.sub(r"\s*\n\s*", " ", command.help.strip()) + "\n"
-    parameters = [one for one in command.params if not getattr(one, "hidden", False) and one.name not in ("help", "version")]
+    parameters = [one for one in command.params if not getattr(one, "hidden", False) and one.name != "help"]
     if not subcommands and len(names) > 1:
         arguments = [_argument(one) for one in parameters if one.param_type_name == "argument"]
         options = "" if len(arguments) == len(parameters) else "[OPTIONS]"

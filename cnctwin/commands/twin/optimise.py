@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson, Dask, MachineDescription, Seed
+from cnctwin.commands.options import AsJson, Dask, MachineDescription, Seed, StockBox
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_encoded
 from cnctwin.processes.extras import needed_by
@@ -47,6 +47,7 @@ def optimise(
     ] = "anywhere",
     pick: Annotated[int | None, typer.Option(help="pareto: which program of the front, from 0; else its knee", min=0)] = None,
     leave: Annotated[list[int] | None, typer.Option(help="Leave this line alone (from 1); may be given again")] = None,
+    stock: StockBox = None,
     engagement: Annotated[Path | None, typer.Option(help="Run log of this program: take what it cuts, not \\[stock]")] = None,
     seed: Seed = 1,
     evolutions: Annotated[int, typer.Option(help="Evolutions of each island", min=0)] = 60,
@@ -65,10 +66,11 @@ def optimise(
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
         from cnctwin.batch.optimisation import Files, left_alone
+        from cnctwin.batch.stock import with_stock
         from cnctwin.files.called_programs import speaking
         from twin.machine import read_machine
         from twin.machine_toml import machine_to_toml
-    described = _with_ranges(read_machine(machine), feed_range, speed_range)
+    described = _with_ranges(with_stock(read_machine(machine), stock), feed_range, speed_range)
     text, encoding = read_encoded(program)
     described = speaking(described, program, text)
     question = asked.Question(

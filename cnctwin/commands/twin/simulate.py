@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import AsJson, MachineDescription
+from cnctwin.commands.options import AsJson, MachineDescription, StockBox
 from cnctwin.errors import UsageError
 from cnctwin.files.called_programs import with_called_programs
 from cnctwin.files.output import check_suffix, write
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 def simulate(
     program: Annotated[Path, typer.Argument(help="The part program")],
     machine: MachineDescription,
+    stock: StockBox = None,
     out: Annotated[Path | None, typer.Option(help="Write the run log there, .parquet or .csv")] = None,
     seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course", min=0)] = None,
     as_json: AsJson = False,
@@ -31,11 +32,12 @@ def simulate(
     """Run a part program on the twin as on a machine: time, peak force, following error, and a run log."""
     with needed_by("the twin", "twin"):
         from cnctwin.batch.simulation import machine_to_simulate, summary_of
+        from cnctwin.batch.stock import with_stock
         from twin.errors import PartProgramError
         from twin.runlog import write_run
         from twin.simulator.simulation import program_settings
         from twin.simulator.simulation import simulate as simulated
-    described = machine_to_simulate(machine)
+    described = with_stock(machine_to_simulate(machine), stock)
     check_suffix(out)
     text = read_text(program)
     with working("simulating"):

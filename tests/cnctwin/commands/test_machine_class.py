@@ -27,3 +27,11 @@ def test_a_file_of_that_name_goes_before_the_class(tmp_path: Path, monkeypatch: 
     Path("vmc-40").write_text("")
     assert file_or_class(Path("vmc-40")) == Path("vmc-40")
     assert file_or_class(Path("mill.toml")) == Path("mill.toml")
+
+
+@pytest.mark.parametrize(("options", "least_n"), [((), None), (("--stock", "0:80,0:60,-20:0"), 50.0)])
+def test_a_class_cuts_where_the_command_states_the_block(options: tuple[str, ...], least_n: float | None) -> None:
+    done = CliRunner().invoke(app, ["simulate", "docs/notebooks/pocket.nc", "--machine", "vmc-40", "--json", *options])
+    assert done.exit_code == 0, done.output
+    force = json.loads(done.stdout).get("cutting_force_n")
+    assert force is None if least_n is None else force["peak"] > least_n

@@ -8,6 +8,7 @@ from twin.errors import PartProgramError
 from twin.programs.canonical import Move, ProgramEnd
 from twin.programs.fanuc import compensation, flow, modes
 from twin.programs.fanuc.block import Kind, Words, parse
+from twin.programs.fanuc.lathe import refuse_lathe
 from twin.programs.fanuc.state import State
 from twin.programs.fanuc.system_variables import SystemVariables
 from twin.programs.fanuc.text import Text
@@ -191,4 +192,5 @@ def interpret(text: str, settings: Settings | None = None) -> list[Move]:
     Linear(line=1, end_mm=(10.0, 0.0, 0.0), feed_mm_min=600.0, feed_per_rev_mm=None, program=None)
     ProgramEnd(line=2, program=None)
     """
+    refuse_lathe(text)
     return Interpreter(text, settings or Settings()).run()
