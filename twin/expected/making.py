@@ -76,10 +76,11 @@ def expectation_of(
     source, block_number = source_lines(program_text), dialect.words.block_number
     numbering = numbering_of(source, block_number) if numbering is None else numbering
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
-    notes = [*remarks(dialect, program_text, own)]
+    notes: list[str] = []
     plan = program_plan(machine, path, notes)
     missing = Missing()
     given = _Given.of(machine, path, plan, notes, missing)
+    notes = [*remarks(dialect, program_text, own, None if given.rows is None else given.rows.lines_met(path)), *notes]
     told = [*numbers(source, numbering, block_number), OUTSIDE]
     runs = tuple(given.runs(told))
     meter = None
