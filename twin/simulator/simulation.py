@@ -175,7 +175,9 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     none = {name: np.zeros(ticks) for name in ("axial_depth_mm", "entry_angle_rad", "exit_angle_rad")}
     if machine.stock is None or machine.tool is None:
         if (path.kind != Kind.RAPID).any():
-            notes.append(f"no [{'stock' if machine.stock is None else 'tool'}]: the program is run in air")
+            one_only = " (simulate knows one tool, [tool]; cnctwin expect knows [tools.N])" if machine.tools else ""
+            missing = "[stock]" if machine.stock is None else f"[tool]{one_only}"
+            notes.append(f"no {missing}: the program is run in air")
         return none
     if path.axes[:3] != ("x", "y", "z") or not len(path):
         return none
