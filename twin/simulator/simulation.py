@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 IDEAL_TIMES = Program(
     rapid_mm_min=RAPID_MM_MIN, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0
 )
-"""What a program is planned with where neither [program] nor an effect of the machine tells of its control: a middling one."""
+"""A middling control: used to plan a program where neither [program] nor an effect of the machine describes its own."""
 TICKS_MAX = 8_000_000
 
 

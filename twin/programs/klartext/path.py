@@ -17,7 +17,7 @@ from twin.programs.planes import PLANES
 from twin.programs.refusal import RefusedError
 
 Shape = Callable[[State, Block, bool, bool], None]
-"""What draws a block: FMAX or not, leaving a contour or not."""
+"""A function that draws a block: FMAX or not, leaving a contour or not."""
 NEAR_MM: Final = 1e-9
 TURNS_MAX: Final = 100_000.0
 
