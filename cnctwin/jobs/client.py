@@ -54,7 +54,7 @@ class JobsClient:
         request = read_request(json.dumps(document).encode())
         answer = self._ask(JOB_REQUEST, document, request.id, wait_s)
         if answer is None:
-            said = f"nobody has accepted {request.id} within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?"
+            said = f"{request.id} was not accepted within {wait_s:g} s{self._why()}; is `cnctwin jobs run` running?"
             raise NoAnswerError(f"{said} It is safe to send it again with the same id: it is done once")
         return answer
 
@@ -62,7 +62,7 @@ class JobsClient:
         """Cancel a job: the consumer's answer. Raises NoAnswerError."""
         answer = self._ask(JOB_CANCEL, {"id": job_id}, job_id, wait_s)
         if answer is None:
-            raise NoAnswerError(f"nobody has answered within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?")
+            raise NoAnswerError(f"no answer within {wait_s:g} s{self._why()}; is `cnctwin jobs run` running?")
         return answer
 
     def state(self, wait_s: float = 5.0) -> dict[str, Any]:

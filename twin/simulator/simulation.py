@@ -124,7 +124,7 @@ def simulate(
     ]
     notes += _saturated(machine, response)
     if assumed := assumed_in_words(machine):
-        notes.append(f"assumed, as nobody has stated or fitted it: {assumed}")
+        notes.append(f"assumed, neither stated nor fitted: {assumed}")
     learned_s = seconds_of(machine.learned, planned.total_s)
     if learned_s:
         notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")
