@@ -70,7 +70,7 @@ class JobsClient:
         self._listen(JOBS_STATE)
         state = self.until(lambda: self._heard.get(JOBS_STATE), wait_s)
         if state is None:
-            raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` there?")
+            raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` running?")
         age_s = published_state.age_s(state, time.time())
         if age_s > FRESH_S_MAX:
             raise NoAnswerError(f"the state of jobs is {age_s:.0f} s old: the consumer does not run any more (cnctwin jobs run)")

@@ -253,7 +253,8 @@ def _show(found: "Optimised", console: Console) -> None:
     console.print(f"bound: {found.bound.value:.2f} ({found.bound.how})", markup=False, highlight=False, soft_wrap=True)
     seconds: dict[str, float] = {}
     for line in found.lines:
-        seconds[line.binds] = seconds.get(line.binds, 0.0) + line.after.seconds
+        binds = line.binds or ("" if line.left_alone else "no limit")
+        seconds[binds] = seconds.get(binds, 0.0) + line.after.seconds
     if sum(seconds.values()) > 0.0:
         console.print(_what_binds(seconds), markup=False, highlight=False, soft_wrap=True)
     if found.sensitivity is not None:
