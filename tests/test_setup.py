@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -29,7 +30,8 @@ def test_the_help_of_a_script_installs_and_starts_nothing(tmp_path: Path, name: 
     script.chmod(0o755)
     done = subprocess.run([script, "--help"], capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout
+    comment = takewhile(lambda line: line.startswith("# "), script.read_text(encoding="utf-8").splitlines()[1:])
+    assert done.stdout.startswith("".join(f"{line[2:]}\n" for line in comment))
     assert sorted(tmp_path.rglob("*")) == [script.parent, script]
 
 
