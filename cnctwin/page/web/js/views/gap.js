@@ -250,7 +250,8 @@ export function open(app, { machine: named }) {
       now.write();
       loop.write();
     };
-  const present = el("section", {}, el("h2", {}, "At this moment, measured − twin"), now.host);
+  const watched = el("p", {}, el("a", { href: app.address("machine", name) }, `Watch ${name} cut`), ": its curves and the twin's, live");
+  const present = el("section", {}, el("h2", {}, "At this moment, measured − twin"), now.host, watched);
   element.append(head.element, loop.element, present, trouble, body, asOf);
   now.write();
   let shown = "",
