@@ -195,11 +195,11 @@ def _told(loop: LoopOutcome) -> str:
     hidden = f"hidden: {loop.effect}{f' on {loop.on}' if loop.on else ''}"
     if not loop.named:
         return f"{hidden}; the loop named nothing by then"
-    others = f", not told from {', '.join(loop.not_told_from)}" if loop.not_told_from else ""
+    others = f", not told apart from {', '.join(loop.not_told_from)}" if loop.not_told_from else ""
     if not loop.promoted or loop.gap_before is None or loop.gap_after is None:
         return f"{hidden}; named: {', '.join(loop.named)}{others}; {'promoted' if loop.promoted else 'not promoted'} by then"
     closed = f", closed after {loop.seconds:.0f} s" if loop.seconds is not None else ""
-    gap = f"{loop.gap_before:.1f} → {loop.gap_after:.1f} floors"
+    gap = f"{loop.gap_before:.1f} → {loop.gap_after:.1f} × the repeatability"
     return f"{hidden}; named: {', '.join(loop.named)}{others}; promoted, standing gap {gap}{closed}"
 
 

@@ -133,7 +133,9 @@ def _machine(machine: MachineView, rows_max: int | None) -> Panel:
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
     hidden = max(len(measured) - shown, 0) + max(len(twin) - shown, 0)
     more = f"{hidden} more signals in a taller terminal" if hidden else None
-    return Panel(table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left", subtitle=more, subtitle_align="right")
+    return Panel(
+        table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left", subtitle=more, subtitle_align="right"
+    )
 
 
 def _ordered(readings: Mapping[str, Reading], first: Sequence[str]) -> list[Reading]:

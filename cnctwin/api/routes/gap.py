@@ -56,7 +56,9 @@ class Gap(Answer):
     basis: str | None
     diagnosis: dict[str, Any] | None
     diagnosis_reason: str | None
-    diagnosis_do: str | None = Field(default=None, description="a command that makes the missing diagnosis where it is looked for")
+    diagnosis_do: str | None = Field(
+        default=None, description="a command that makes the missing diagnosis where it is looked for"
+    )
     report: str | None
 
 
