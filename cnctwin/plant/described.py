@@ -1,5 +1,6 @@
 """The findings of `cnctwin doctor` on descriptions: which is live since when, what is assumed, what waits, what is wrong."""
 
+import shlex
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -72,7 +73,8 @@ def assumptions(machine: MachineFile) -> tuple[str, ...]:
 def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[tuple[bool, str]]:
     """Return a sentence on each thing there is to say of a machine's description, and whether it is good."""
     name = found.machine
-    fit = f"`cnctwin identify --store {store} --machine {name} --out {name}.toml` fits"
+    typed = shlex.quote(name)
+    fit = f"`cnctwin identify --store {shlex.quote(store)} --machine {typed} --out {shlex.quote(f'{name}.toml')}` fits"
     if found.assumed is None:
         yield True, f"{name}: not described, so its constants are assumed; write machines/{name}.toml, or {fit} one"
     else:
@@ -85,7 +87,7 @@ def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[tuple[b
     if found.challenger:
         why = f": {found.challenger_why}" if found.challenger_why else ""
         waits = f"challenger {found.challenger} waits{_since(found.challenger_since_ms)}{why}"
-        yield True, f"{name}: {waits}; `cnctwin twin show {name}` weighs it, `cnctwin twin promote {name}` makes it live"
+        yield True, f"{name}: {waits}; `cnctwin twin show {typed}` weighs it, `cnctwin twin promote {typed}` makes it live"
     for fault in found.faults:
         yield False, f"{name}: {fault}"
 

@@ -62,7 +62,7 @@ def show(
             on_events(host.poll(0.1))
             if time.monotonic() - shown_s >= 0.25:
                 shown_s = time.monotonic()
-                live.update(screen(seen(), ledgers(host), note()), refresh=True)
+                live.update(screen(seen(), ledgers(host), note(), console.height), refresh=True)
 
 
 def watch(broker: BrokerAddress, group: str, machine: str | None, stop: Event) -> None:
