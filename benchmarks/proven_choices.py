@@ -26,7 +26,7 @@ from twin.recording.recorded_program import RecordedProgram, line_starts
 Floats = NDArray[np.float64]
 INCH_MM = 25.4
 REFERENCE = "plate 13"
-"""Whose order of tools and whose knobs a composed program gets: it was the fastest, and nobody touched a knob (rapid at 52 %)."""
+"""The program whose order of tools and knobs a composed one gets: the fastest, its knobs untouched (rapid at 52 %)."""
 KEPT_SHARE, KEPT_RATIO, SPINDLE_WITHIN = 0.99, 0.98, 0.02
 TURNED = 0.01
 """An override that moves by more within a section was turned there."""
@@ -83,7 +83,7 @@ class Savings:
     worst_s: float
     right: int
     clear: int
-    """Of `clear` pairs that differ by over 2 % of the section, `right` were predicted with the right sign."""
+    """`clear` pairs differ by over 2 % of the section; `right` of them were predicted with the right sign."""
 
 
 def spans(path: Path) -> list[tuple[int, slice]]:

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 DAY_S = 86_400.0
 CYCLE = {SPEED: "spindle_rpm", LOAD: "spindle_load_pct", FEED: "feed_mm_min"} | {name: f"{name[5]}_pos_mm" for name in POSITIONS}
 COLUMN = {"second_thermal_mass__conductance_w_per_k": 4.0, "second_thermal_mass__capacity_j_per_k": 40_000.0}
-"""What the physics lacks, in the size that machines show (twin/effects/second_thermal_mass.py)."""
+"""Effect that the physics lacks, in the size that machines show (twin/effects/second_thermal_mass.py)."""
 
 
 @dataclass(frozen=True, slots=True)

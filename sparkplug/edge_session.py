@@ -31,7 +31,7 @@ _SEQ_FIELDS = tuple(b"\x18" + written(seq) for seq in range(256))  # as the last
 
 
 Aliases = dict[tuple[str | None, str], int]
-"""Of each metric, by device (None: the node's own) and name. They are 1 to n, so that the next one is n + 1."""
+"""The alias of each metric, by device (None: the node's own) and name. They are 1 to n, so that the next one is n + 1."""
 
 
 class Phase(Enum):

@@ -19,17 +19,19 @@ NAME = re.compile(r"^\s*(def anew|anew = |ANEW = )|\(anew[,)]|as anew:|, anew( =
 
 
 def fragments(source: str) -> Iterator[str]:
-    """Yield the docstrings of a module that begin as a fragment does, each by its line and first words."""
+    """Yield the docstrings that begin as a fragment does, of constants too, each by its line and first words."""
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            text = ast.get_docstring(node) or ""
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            text = node.value.value.strip()
             if FRAGMENT.match(text):
-                yield f"{getattr(node, 'lineno', 1)}: {text[:60]}"
+                yield f"{node.lineno}: {text[:60]}"
 
 
 def test_a_fragment_is_found() -> None:
-    source = '"""What a thing is."""\ndef f():\n    """Of a thing."""\ndef g():\n    """Return what a thing is."""\n'
-    assert list(fragments(source)) == ["1: What a thing is.", "2: Of a thing."]
+    source = (
+        '"""What a thing is."""\nPART = 0.1\n"""Of a thing."""\ndef f():\n    """How it is."""\ndef g():\n    """Return it."""\n'
+    )
+    assert list(fragments(source)) == ["1: What a thing is.", "3: Of a thing.", "5: How it is."]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())

@@ -33,7 +33,7 @@ from twin.simulator.response import RunInput, respond
 
 Floats = NDArray[np.float64]
 EVERY = 7
-"""Of so many samples of a fast run one is taken."""
+"""One of so many samples of a fast run is taken."""
 VOTES_MIN = 0.5
 CAUSES_MAX = 3
 

@@ -30,7 +30,7 @@ SET_UP = ("reference_z", "tool_change_x", "tool_change_y")
 """Places, in mm: fitted as they are, the rest in the logarithm."""
 SCALE_MM = 100.0
 ORIGIN = 10.0
-"""Of the free variables, ORIGIN + ln(value / start) or ORIGIN + (value − start) / scale: one relative step suits all."""
+"""Origin of the free variables, ORIGIN + ln(value / start) or ORIGIN + (value − start) / scale: one relative step suits all."""
 START: dict[str, float] = {
     "acceleration_mm_s2": 300.0,
     "centripetal_mm_s2": 300.0,

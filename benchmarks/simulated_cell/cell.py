@@ -21,7 +21,7 @@ LATE_LABELS = 4
 """One machine in so many tells late of its tool changes."""
 AROUND_S = 120.0
 CUTTING_SHARE_MIN = 0.4
-"""What breaks while a machine stands shows nothing; a fault is planted where the machine cuts in so much of its time."""
+"""Share of its time in which a machine cuts where a fault is planted: one that breaks while it stands shows nothing."""
 USE_S_MIN = 20
 """A fault of one tool begins where that tool goes on cutting for so long."""
 

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")
 STILL_G = 0.012
 WEATHER_S = 2.0 * DAY_S
-"""How long the weather stays alike; it moves the hall by 1.5 K."""
+"""Time for which the weather stays alike; it moves the hall by 1.5 K."""
 RAMP_S = 0.12
 COLD_SHARE, COLD_S = 0.25, 1800.0
 """Idle power is so much larger while the grease is cold, and for how long a run warms it."""

@@ -25,7 +25,7 @@ from twin.wear.machine import Wear, cut_added
 
 FROM_DAY = 60.0
 Blocks = list[tuple[float, float, int]]
-"""Of each block: the day of its end, its figure, and how the chart of the gap judges it."""
+"""For each block: the day of its end, its figure, and how the chart of the gap judges it."""
 
 
 def blocks_of(seed: int, days: float, from_day: float, config: Config) -> Blocks:

@@ -140,7 +140,7 @@ class Access:
                 return Verdict(0, user=bearer.name or None, role=bearer.role)
             return Verdict(401, "no token: log in at /login, or send Authorization: Bearer …")
         if self.proxy_header is not None:
-            who = "the proxy names nobody" if by_proxy else "this server is asked through its proxy only"
+            who = "the proxy names no user" if by_proxy else "this server is asked through its proxy only"
             return Verdict(401, f"{who}: header {self.proxy_header}, from the proxy's address")
         return Verdict(0, role=Role.ADMINISTRATOR)
 

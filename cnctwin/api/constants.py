@@ -57,4 +57,4 @@ class Constants:
             return f"[{table}.machines.{machine}] of the configuration"
         if table in self._tables:
             return f"[{table}] of the configuration, for all machines"
-        return "defaults: nobody has described this machine; good for trends only"
+        return "defaults: this machine has no description; good for trends only"

@@ -108,7 +108,8 @@ def access_of(options: ServeOptions, variable: str | None) -> Any:
     access = Access(token, options.proxy_header, options.proxy, hosts, users)
     if options.users is not None and not access.has_tokens and options.proxy_header is None:
         raise UsageError(
-            f"--users {options.users}: nobody has a token; give each one, or name a proxy (--proxy-header and --proxy)"
+            f"--users {options.users}: none of these users has a token; give each one a token, or name a proxy "
+            "(--proxy-header and --proxy)"
         )
     if not is_loopback(options.host) and not access.has_tokens and options.proxy_header is None:
         raise UsageError(

@@ -125,7 +125,7 @@ def answer_to(question: Question, hooks: Hooks, checkpoint: str | None = None, *
 
 def left_alone(lines: Iterable[int]) -> dict[int, str]:
     """Return lines (from 1) that may not be changed as a `Question` has them."""
-    return {line - 1: "it was to be left alone" for line in lines}
+    return {line - 1: "as asked" for line in lines}
 
 
 def write_answer(answer: Optimised, files: Files) -> None:

@@ -16,7 +16,7 @@ def assumed_description(machine: str) -> str:
     >>> machine_from_toml(assumed_description("vmc")).machine.assumed
     ('spindle', 'thermal')
     """
-    return f"""# Nobody has described this machine: its constants are assumptions until something fits them.
+    return f"""# This machine has no description yet: its constants are assumptions until something fits them.
 [machine]
 name = {json.dumps(machine, ensure_ascii=False)}
 assumed = ["spindle", "thermal"]

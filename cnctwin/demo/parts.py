@@ -35,7 +35,7 @@ NONE = "none"
 ASSUMED = Path(__file__).with_name("assumed.toml")
 CALENDAR = Path(__file__).with_name("calendar.toml")
 _RECORDED_TOML = """\
-# A recording may have no sensor of the air, and its machine is nobody's to correct.
+# A recording may have no sensor of the air, and its machine can no longer be corrected.
 [thermal]
 ambient_temp_c = 22.0
 

@@ -54,7 +54,7 @@ class JobsClient:
         request = read_request(json.dumps(document).encode())
         answer = self._ask(JOB_REQUEST, document, request.id, wait_s)
         if answer is None:
-            said = f"nobody has accepted {request.id} within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?"
+            said = f"{request.id} was not accepted within {wait_s:g} s{self._why()}; is `cnctwin jobs run` running?"
             raise NoAnswerError(f"{said} It is safe to send it again with the same id: it is done once")
         return answer
 
@@ -62,7 +62,7 @@ class JobsClient:
         """Cancel a job: the consumer's answer. Raises NoAnswerError."""
         answer = self._ask(JOB_CANCEL, {"id": job_id}, job_id, wait_s)
         if answer is None:
-            raise NoAnswerError(f"nobody has answered within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?")
+            raise NoAnswerError(f"no answer within {wait_s:g} s{self._why()}; is `cnctwin jobs run` running?")
         return answer
 
     def state(self, wait_s: float = 5.0) -> dict[str, Any]:
@@ -70,7 +70,7 @@ class JobsClient:
         self._listen(JOBS_STATE)
         state = self.until(lambda: self._heard.get(JOBS_STATE), wait_s)
         if state is None:
-            raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` there?")
+            raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` running?")
         age_s = published_state.age_s(state, time.time())
         if age_s > FRESH_S_MAX:
             raise NoAnswerError(f"the state of jobs is {age_s:.0f} s old: the consumer does not run any more (cnctwin jobs run)")

@@ -76,7 +76,7 @@ class MovingCourier:
             try:
                 courier, self._next = self._next or self._new(), None
             except ConfigurationError as error:  # a file of a secret that is gone since
-                _log.error("no courier can be started, and nobody is notified: %s; another attempt in %g s", error, AGAIN_S)
+                _log.error("no courier can be started, so no notification is sent: %s; another attempt in %g s", error, AGAIN_S)
                 self._awaited(lambda: not self._is_wanted, AGAIN_S)
                 continue
             self._work(courier)

@@ -109,7 +109,7 @@ class LoopService:
             if request.machine in self._names():
                 self._look(request.machine, now_s, request)
             else:
-                _log.warning("%s: nobody has described %r; it cannot be asked for", request.word, request.machine[:80])
+                _log.warning("%s: %r has no description, so the request is ignored", request.word, request.machine[:80])
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s
             for machine in self._names():

@@ -148,7 +148,7 @@ class Workshop:
             self._asked_s[case] = now_s
             told = {"job": "diagnose", "id": case, "case": f"{FOLDER}/{machine}/{case}", "reply_to": JOB_REPLY + case}
             self.ask({**told, "by": "loop"})
-        return Work(doing="no consumer of jobs has answered yet; is `cnctwin jobs run` there?")
+        return Work(doing="no consumer of jobs has answered yet; is `cnctwin jobs run` running?")
 
     def _done_by_a_child(self, order: Mapping[str, Any]) -> Work:
         """Have a child carry out an order, one at a time for all machines."""

@@ -74,7 +74,7 @@ def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[tuple[b
     name = found.machine
     fit = f"`cnctwin identify --store {store} --machine {name} --out {name}.toml` fits"
     if found.assumed is None:
-        yield True, f"{name}: nobody has described it, so its constants are assumed; write machines/{name}.toml, or {fit} one"
+        yield True, f"{name}: not described, so its constants are assumed; write machines/{name}.toml, or {fit} one"
     else:
         how = " ".join(filter(None, (found.step, f"by {found.by}" if found.by else "")))
         said = ": ".join(filter(None, (how, found.why)))

@@ -139,12 +139,13 @@ def _of_bridges(alive: list[_Seen]) -> list[Said]:
         found.append(
             Said(
                 False,
-                f"{who}: no room for {rises} records while listening, {dropped} so far; the folds are "
-                "told of a hole: bring the cluster back, then give buffer_mb more for its next outage",
+                f"{who}: no room for {rises} records while listening, {dropped} so far; the hole "
+                "is reported to the folds: bring the cluster back, then give buffer_mb more for its next outage",
             )
         )
     elif dropped:
-        found.append(Said(True, f"{who}: no room for {dropped} records so far, none while listening; told to the folds as holes"))
+        said = f"{who}: no room for {dropped} records so far, none while listening; reported to the folds as holes"
+        found.append(Said(True, said))
     if not found:
         found.append(Said(True, f"{who} to the log: {one.count('bridge_delivered')} records delivered, {waiting} waiting"))
     return found
@@ -159,8 +160,8 @@ def _of_silent(alive: list[_Seen]) -> list[Said]:
         Said(
             False,
             f"{', '.join(names)}: silent, and did not say goodbye; start it again under its name (what a silent bridge reads "
-            "does not come into the log; the partitions of a silent runner go to the others); one that is gone for good is told "
-            "for a day",
+            "does not come into the log; the partitions of a silent runner go to the others); one that is gone for good is "
+            "listed for a day",
         )
     ]
 

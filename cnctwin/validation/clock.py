@@ -69,7 +69,7 @@ def _placed(pair: Pair, grid: Grid, reach_s: tuple[float, float], of: str) -> tu
     offsets = lags * every_s + from_s - own_s
     inside = np.isfinite(r) & (offsets >= reach_s[0] - every_s) & (offsets <= reach_s[1] + every_s)
     if not inside.any():
-        return f"{by}: too little of it is told by both, or it does not change"
+        return f"{by}: both report too little of it, or it does not change"
     r = np.where(inside, r, -np.inf)
     best = int(np.argmax(r))
     peak = float(r[best])

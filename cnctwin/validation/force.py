@@ -43,7 +43,7 @@ def judged_force(twin: Twin, evidence: Evidence, budgets: Budgets) -> list[Figur
     if measured is None and evidence.run is not None:
         measured, origin = resultant_of(evidence.run), "the run's dynamometer"
     if measured is None:
-        return unseen(QUANTITY, [measure], evidence.truth_reason or "no force_x_n, force_y_n: nobody measured the force")
+        return unseen(QUANTITY, [measure], evidence.truth_reason or "no force_x_n, force_y_n: the force was not measured")
     every_s = STORE_EVERY_S if evidence.run is None else RUN_EVERY_S
     grid = Grid.over(evidence.from_s, evidence.to_s, every_s)
     try:

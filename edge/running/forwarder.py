@@ -311,7 +311,7 @@ class Forwarder:
             ):
                 self.history_rows += 1
         except (SparkplugError, StoreError, ValueError, TypeError) as error:
-            _log.warning("%s: row %d of the store cannot be told any more: %s", self._ring.file, row.sequence, error)
+            _log.warning("%s: row %d of the store can no longer be sent: %s", self._ring.file, row.sequence, error)
             self._forget(row)
 
     def _forget(self, row: StoredRow) -> None:

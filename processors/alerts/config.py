@@ -156,7 +156,7 @@ class AlertsConfig(CellConfig):
                 raise ValueError(f"{where}: there is no receiver {name!r}; there are: {', '.join(self.receivers) or 'none'}")
         beats_to = self.receivers.get(self.heartbeat.receiver)
         if beats_to is not None and beats_to.type == "pushover":
-            raise ValueError("heartbeat: a person is not to be told every few minutes that all is well; use a webhook")
+            raise ValueError("heartbeat: a person should not be notified every few minutes that all is well; use a webhook")
         return self
 
     def rule_of(self, name: str, signal: str) -> Rule | None:

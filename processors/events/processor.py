@@ -62,7 +62,7 @@ class Config(ProcessorConfig):
 
     window_h: float = Field(default=24.0, ge=0.1, le=168.0, description="the rolling window of the utilisation")
     day_begins_h_utc: float = Field(default=0.0, ge=0.0, lt=24.0, description="when a day begins")
-    seen_s_min: float = Field(default=600.0, ge=0.0, le=86_400.0, description="of the window, before a share is told")
+    seen_s_min: float = Field(default=600.0, ge=0.0, le=86_400.0, description="of the window, before a share is reported")
     cycle_s_min: float = Field(default=5.0, ge=0.0, le=3600.0, description="a shorter run is no part")
     modes: tuple[str, ...] = Field(default=("AUTOMATIC", "SEMI_AUTOMATIC"), description="a run in another mode is no part")
     feed_mm_min_min: float = Field(default=1.0, gt=0.0, le=1e6, description="without exec_state: ACTIVE from this feed on")
@@ -315,7 +315,7 @@ PROCESSOR = Processor(
         OutputSpec(INTERRUPTED, _NUMBER, "s", "of the last run, in which it was interrupted", _MEASURED),
         OutputSpec(UTILISATION, _NUMBER, "%", "share of ACTIVE in the rolling window, of the time that was seen", _MEASURED, 0.5),
         OutputSpec(TODAY, _NUMBER, "%", "share of ACTIVE today, of the time that was seen", _MEASURED, 0.5),
-        OutputSpec(STOP, _TEXT, None, "why the machine stands, as far as it is told; none while it works", Provenance.INFERRED),
+        OutputSpec(STOP, _TEXT, None, "why the machine stands, as far as reported; none while it works", Provenance.INFERRED),
         OutputSpec(STOP_S, _NUMBER, "s", "how long it stands, or the last stop lasted", _MEASURED),
         OutputSpec(PART, DataType.TEXT, None, "as-built record of the last part, JSON", Provenance.INFERRED),
     ),

@@ -29,7 +29,7 @@ class Config(ProcessorConfig):
     block_s: float = Field(default=3600.0, ge=60.0, le=86_400.0)
     window_hours: float = Field(default=2.0, gt=0.0, le=48.0)
     standing_hours: float = Field(default=8.0, gt=0.0, le=720.0)
-    shown_s_min: float = Field(default=60.0, ge=1.0, le=3600.0, description="of a regime, before its standing figure is told")
+    shown_s_min: float = Field(default=60.0, ge=1.0, le=3600.0, description="of a regime, before its standing figure is reported")
     open_floors: PositiveFloat = 2.0
     open_s: float = Field(default=600.0, ge=1.0, le=604_800.0)
     publish_s: float = Field(default=60.0, ge=1.0, le=3600.0)

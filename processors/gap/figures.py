@@ -172,11 +172,11 @@ def _basis(given: Given, state: State, at_s: float) -> str:
     change = learned if twin.tool_change_s is None else f"{twin.tool_change_s:.3g} s from a stopped spindle, else learned"
     heat = "the description's heat" if twin.version else "thermal network"
     notes = {signal: " (assumed)" if signal in twin.assumed else "" for signal in (TEMPERATURE, LOAD, TOOL_CHANGE)}
-    stated = "stated" if config.healthy_from is not None else "assumed, nobody stated it"
+    stated = "stated" if config.healthy_from is not None else "assumed, not stated"
     floors = ", ".join(f"{signal} {floor:g}" for signal, floor in config.floors.items()) or "none"
     until_learned = _floors_of_noise(given, state, at_s)
     effects = f"; with {', '.join(twin.effects)}" if twin.effects else ""
-    gate = "; tool changes are not gated: nobody tells them" if state.watch.change is ToolChange.ABSENT else ""
+    gate = "; tool changes are not gated: no signal reports them" if state.watch.change is ToolChange.ABSENT else ""
     return (
         f"{described}; temperature: {heat}{notes[TEMPERATURE]}; {LOAD}: in air {idle}{notes[LOAD]}, cutting learned by program; "
         f"speed: command; tool change: {change}{notes[TOOL_CHANGE]}; program time and axis loads: learned{effects}; "

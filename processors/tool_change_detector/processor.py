@@ -222,7 +222,7 @@ def _basis(detector: "Detector", sample: Sample) -> str:
     if detector.weighing is not None:
         _, no_feed = sample.number(FEED)
         has_block = _block(sample) is not None
-        parts.append("feed and block weighed" if has_block and not no_feed else f"signal alone: {no_feed or 'no block is told'}")
+        parts.append("feed and block weighed" if has_block and not no_feed else f"signal alone: {no_feed or 'no block reported'}")
     reported = sample.row.get(REPORTED)
     if reported is not None and reported.quality is Quality.GOOD and isinstance(reported.value, bool):
         parts.append(f"the control itself reports {REPORTED}")

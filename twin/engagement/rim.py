@@ -23,9 +23,9 @@ BISECTIONS = 20
 JUMP = 1 / 200
 """A change of depth from one step to the next that is larger than this part of the radius is a step, not a slope."""
 DEPTH_MIN_MM = 1e-4
-"""What stands less above the end face is a trace of a former pass, not a depth of cut."""
+"""Least depth of cut: material that stands less above the end face is a trace of a former pass."""
 WIDTH_MIN_MM = 1e-3
-"""What is narrower than this across the feed is rounding: no chip, and no step in one."""
+"""Least width of cut across the feed: anything narrower is rounding, no chip and no step in one."""
 
 
 class Contact(NamedTuple):

@@ -49,5 +49,7 @@ def in_words(
     if any(section.site is LearnedSite.CUT_FORCE for section in machine.learned):
         learned.append("without the learned term of the cutting force")
     effects = [one.effect for one in machine.effects]
-    with_effects = [f"with the effects {', '.join(dict.fromkeys(effects))}"] if effects else []
+    with_effects = (
+        [f"computed with these effects of the machine description: {', '.join(dict.fromkeys(effects))}"] if effects else []
+    )
     return (IN_WORDS[numbering] + named, *with_effects, *dict.fromkeys(notes), *learned, *missing.sentences())

@@ -21,7 +21,7 @@ class Numbering(StrEnum):
 
 
 IN_WORDS = {
-    Numbering.N_WORDS: "lines by block number",
+    Numbering.N_WORDS: "lines by the block numbers in the program",
     Numbering.FROM_0: "lines counted from 0",
     Numbering.FROM_1: "lines counted from 1",
 }

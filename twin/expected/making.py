@@ -200,7 +200,10 @@ class _Given:
         tools = set(self.tool[cutting].tolist())
         if -1 in tools:
             unknown = sorted({int(n) for n, index in zip(self.number[cutting], self.tool[cutting], strict=True) if index < 0})
-            return f"tool {unknown[0]} is not described: write [tools.{unknown[0]}]"
+            return (
+                f"tool {unknown[0]} is not described: write [tools.{unknown[0]}] if it is an end mill; a drill or a tap has no "
+                "load in any case"
+            )
         rows = np.concatenate([np.arange(self.rows.first[s], self.rows.first[s + 1]) for s in cutting.tolist()])
         own = self.rows.segment[rows]
         start, end = self.path.tip_ends_mm(own)

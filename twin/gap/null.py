@@ -13,7 +13,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage
 
 SMOOTH = 1.3
-"""What a healthy twin leaves of a signal at worst where nothing rough is about, in floors."""
+"""Greatest gap of a signal that a healthy twin leaves where nothing is rough, in floors."""
 
 
 @dataclass(frozen=True, slots=True)

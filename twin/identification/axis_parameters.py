@@ -71,7 +71,7 @@ def axis_parameters(machine: MachineFile, letter: str, *, force_known: bool, fre
 
 
 VELOCITY_DELAY = AxisParameter("velocity_feedback_delay__delay_s", "s", False, 0.0005)
-"""How old the velocity is that the loop is fed. Nominally it is not; where it is, a fit without it takes it for missing mass."""
+"""Age of the velocity fed to the loop, nominally 0; a fit that leaves out a delay takes it for missing mass."""
 
 
 def effects_of(parameters: tuple[AxisParameter, ...]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from twin.rotary import Letters, outside_name, outside_path, outside_unit
 
 Floats = NDArray[np.float64]
 INTERVAL_Z = 1.959963984540054
-"""Of a 95 % interval."""
+"""Half-width of a 95 % interval, in standard deviations."""
 KNOWN_MIN = 0.5
 """Part of the information that has to come from the recordings; below it the stated value stays."""
 

@@ -115,7 +115,8 @@ def _misfits(runs: tuple[Run, ...], gaps: tuple[GapRow, ...]) -> tuple[str, ...]
             if gap > MISFIT_PART * size and gap > 10.0 * max(row.expected for row in rows):
                 said.append(
                     f"{run.name}: {signal} is missed by {gap:.3g} rms, {100 * gap / max(size, 1e-12):.0f} % of what it does; "
-                    "look at its sign and unit, and whether this is the machine that machine.toml describes"
+                    "look at its sign and unit, and whether this is the machine that machine.toml describes; or an effect is "
+                    "missing from the twin: cnctwin gap diagnose CASE"
                 )
     return tuple(said)
 

@@ -41,7 +41,7 @@ SCALE_BOUNDS = (0.3, 3.0)
 SCALE_MIN = 1e-3
 SLOPE_SAMPLES = 11
 TANGENTIAL_BOUNDS = (0.25, 4.0)
-"""Of K_t, as factors on what the machine states."""
+"""Bounds of K_t, as factors on the figure that the machine states."""
 RADIAL_BOUNDS = (0.0, 1.5)
 VALLEY = 1e-3
 """Part by which J_cf has to grow, K_e off by 0.2, if the resultant is to tell K_t from K_e."""

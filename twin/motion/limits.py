@@ -21,7 +21,7 @@ from twin.motion.path import Event, EventKind, Kind, Path
 
 Floats = NDArray[np.float64]
 ACCELERATION_MAX_MM_S2 = 1e9
-"""What stands for no limit: from rest to any feed in less than a microsecond."""
+"""The acceleration that stands for no limit: from rest to any feed in less than a microsecond."""
 PerAxis = float | tuple[float, ...]
 """One figure for all axes, or one for each in the order of the path's axes."""
 

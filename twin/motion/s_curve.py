@@ -14,7 +14,7 @@ import math
 from twin.kernels.compiling import kernel
 
 ITERATIONS_MAX = 100
-"""Of the safeguarded Newton steps; four to eight are used, and each that fails to help halves the bracket."""
+"""Most safeguarded Newton steps; four to eight are used, and each that fails to help halves the bracket."""
 
 
 @kernel

@@ -171,7 +171,8 @@ def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple
     if plunging := sum(line.plunges for line in made.program.lines):
         notes.append(f"the force of {plunging} lines that go down into material is not modelled: it is in no figure and no limit")
     if alone:
-        notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone: {_reasons(alone)}")
+        head = f"{len(alone)} of {len(made.program.lines)} feed lines are left alone (line numbers are those of the text)"
+        notes.append(f"{head}: {_reasons(alone, made)}")
     if made.economy is not None and not made.economy.wears_in_cut:
         notes.append('the tool is taken to wear all the time (Eq. 20); [cost] tool_wears = "in_cut" counts cutting only')
     if limits_of(made.program.machine, question.force_limit_n).chip_mm is None:
@@ -191,16 +192,18 @@ def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple
     return tuple(notes)
 
 
-def _reasons(alone: Sequence[FeedLine]) -> str:
-    """Return the lines that are left alone by their reason, a few of each."""
+def _reasons(alone: Sequence[FeedLine], made: Problem) -> str:
+    """Return the lines left alone by their reason, a few of each, with the block numbers that the program gives them."""
+    source, block_of = source_lines(made.program.text), made.program.words.block_number
     by_why: dict[str, list[int]] = {}
     for line in alone:
         by_why.setdefault(line.left_alone, []).append(line.line + 1)
     said = []
     for why, numbers in by_why.items():
         more = f" and {len(numbers) - LINES_SHOWN} more" if len(numbers) > LINES_SHOWN else ""
-        shown = ", ".join(str(number) for number in sorted(numbers)[:LINES_SHOWN])
-        said.append(f"line{'s'[: len(numbers) > 1]} {shown}{more} ({why})")
+        first = [(number, block_of(source[number - 1])) for number in sorted(numbers)[:LINES_SHOWN]]
+        shown = ", ".join(f"{number}" if block is None else f"{number} (block {block})" for number, block in first)
+        said.append(f"line{'s'[: len(numbers) > 1]} {shown}{more}: {why}")
     return "; ".join(said)
 
 

@@ -138,7 +138,7 @@ def _check_lines(question: Question) -> None:
     feeding = {line.line for line in problem(question).program.lines}
     for line in question.left_alone:
         if line not in feeding:
-            raise OptimisationError(f"line {line + 1} is to be left alone, and is no line that feeds")
+            raise OptimisationError(f"line {line + 1} cannot be left alone: it is not a line that feeds")
 
 
 def _followed(question: Question) -> Question:
@@ -168,7 +168,7 @@ def _with_left_alone(question: Question, made: Problem, missed: Mapping[int, str
         places = [place for place, number in enumerate(order) if number == line]
         for place in places:
             before = list(dict.fromkeys(number for number in reversed(order[:place]) if number in free))
-            why = f"line {line + 1} behind it is left alone, and takes over what this one leaves in force"
+            why = f"line {line + 1} after it is left alone, and runs at what this one leaves in force"
             new |= dict.fromkeys(before if freezes >= FREEZES_MAX else before[:1], why)
     if not new:
         line, why = next(iter(missed.items()))

@@ -73,14 +73,16 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
 
 
 def _at_fault(problem: Problem, source: list[str], number: int, what: str) -> tuple[int, str]:
-    """The line to be left alone for one that was missed, and why: itself, or the line before a call that takes no word."""
+    """Return the line to leave alone for one that was missed, and why: itself, or the line before a call that takes no word."""
     words, order = problem.program.words, lines_executed(problem)
+    letter = "S" if what == "speed" else "F"
     if words.with_feed(source[number], "1") == source[number] and words.feed_place(source[number]) is None and number in order:
         free = {line.line for line in problem.program.lines if not line.left_alone}
         for before in reversed(order[: order.index(number)]):
             if before in free:
-                return before, f"line {number + 1} behind it needs its {what} as it is, and takes no word of its own"
-    return number, f"its {what} does not follow the word that was written"
+                after = f"line {number + 1} after it has to keep its {what} and can have no {letter} word of its own"
+                return before, f"{after}: a new {letter} word here would change it"
+    return number, f"a new {letter} word here would not set its {what}: the control would run it at another one"
 
 
 def _changed_between(problem: Problem, path: Path) -> dict[int, str]:

@@ -51,7 +51,7 @@ WINDOWS = [
     "                sine_mid = sin(middle_rad)",
     "                cosine_mid = cos(middle_rad)",
 ]
-"""What a parallel edge turns through until the next tick, as far as it is in the cut."""
+"""The angle that a parallel edge turns through until the next tick, as far as it is in the cut."""
 
 STRETCHES = [
     "shorter_rad = turn_rad if turn_rad < lag_rad else lag_rad",
@@ -66,7 +66,7 @@ STRETCHES = [
     "    elif stretch == 3:",
     "        start_rad, stop_rad, weight, slope = end_rad - shorter_rad, end_rad, shorter_rad / lag_rad, -1.0 / lag_rad",
 ]
-"""What stands at the tick, and rise, top and fall of the trapezium of what passes until the next one."""
+"""The part of the edge in the cut at the tick, and rise, top and fall of the trapezium that passes until the next one."""
 
 PASSED = [
     "for turn in range(int(floor(start_rad * 0.15915494309189535)), int(floor(stop_rad * 0.15915494309189535)) + 1):",

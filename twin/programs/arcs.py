@@ -63,8 +63,10 @@ def by_radius(start: Point, end: Point, radius: float, clockwise: bool, error_mm
     return Sweep(centre, sweep_about(start, end, centre, clockwise))
 
 
-def by_centre(start: Point, end: Point, centre: Point, clockwise: bool, error_mm_max: float) -> Sweep:
+def by_centre(start: Point, end: Point, centre: Point, clockwise: bool, error_mm_max: float, pole: str = "") -> Sweep:
     """The I, J, K form. RefusedError where start and end are not equally far from the centre.
+
+    pole: the word that sets the centre, in a language that has no I, J, K
 
     >>> round(by_centre((1.0, 0.0), (1.0, 0.0), (0.0, 0.0), False, 0.01).sweep_rad, 4)
     6.2832
@@ -72,11 +74,13 @@ def by_centre(start: Point, end: Point, centre: Point, clockwise: bool, error_mm
     start_radius = math.hypot(start[0] - centre[0], start[1] - centre[1])
     end_radius = math.hypot(end[0] - centre[0], end[1] - centre[1])
     if start_radius < SAME_POINT_MM:
-        raise RefusedError("", "the centre of this arc is its start; write I, J or K of the plane, or R")
+        way_out = f"correct {pole} or the start" if pole else "write I, J or K of the plane, or R"
+        raise RefusedError("", f"the centre of this arc is its start; {way_out}")
     if abs(start_radius - end_radius) > error_mm_max:
         raise RefusedError(
             "",
-            f"the end of this arc is {end_radius:g} mm from its centre, its start {start_radius:g}; correct I, J, K or the end",
+            f"the end of this arc is {end_radius:g} mm from its centre, its start {start_radius:g}; "
+            f"correct {pole or 'I, J, K'} or the end",
         )
     return Sweep(centre, sweep_about(start, end, centre, clockwise))
 

@@ -21,7 +21,7 @@ from twin.recording.observations import Observation, Observations, last_values
 Floats = NDArray[np.float64]
 RUNNING = {"ACTIVE", "FEED_HOLD"}
 PASSING = ("Program_Name_Running", "Block_Number")
-"""What one run leaves behind says nothing of the next."""
+"""Signals whose last value in one run says nothing of the next."""
 STANDS_S = 2.5
 """A counter of seconds that has not moved for so long stands."""
 OVERRIDES = {

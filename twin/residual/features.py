@@ -53,10 +53,10 @@ def feature(name: str) -> Feature:
 PUBLISHED = tuple(map(feature, SIGNALS))
 """The eight that the published recipe names."""
 REMEMBERED = tuple(Feature(RISE, over_s) for over_s in (600.0, 3600.0, 14_400.0))
-"""How warm it has been: what is behind the one mass that the physics has."""
+"""The temperature rise of the past: it stands for masses beyond the one that the physics has."""
 LEAN = (Feature(SPEED, 600.0), Feature(LOAD, 600.0), feature(AMBIENT), feature(PHYSICS), *REMEMBERED)
 SETS: Mapping[str, tuple[Feature, ...]] = {"published": PUBLISHED, "remembering": (*PUBLISHED, *REMEMBERED), "lean": LEAN}
-"""Of which the published one is used, unless another is better on time that was held out (twin/residual/training.py)."""
+"""Sets of features; the published one is used unless another is better on time that was held out (twin/residual/training.py)."""
 
 
 @dataclass(frozen=True, slots=True)

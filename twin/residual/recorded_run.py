@@ -20,7 +20,7 @@ from twin.simulator.response import RunInput, respond
 
 Floats = NDArray[np.float64]
 COLUMNS = {name: f"{name[5]}_pos_mm" for name in POSITIONS}
-"""What a run log calls them."""
+"""Their names in a run log."""
 COOLANT = "coolant_on"
 RECORDED = (SPEED, LOAD, FEED, *POSITIONS, AMBIENT, MEASURED, COOLANT)
 TICKS_MAX = 20_000_000

@@ -12,7 +12,7 @@ PROTOTYPES = 1000
 INSIDE = 0.99
 """Share of the training rows that the limit holds inside, each beside rows of other blocks of time only."""
 MARGIN = 0.02
-"""Of its range, that a feature may go beyond."""
+"""Part of its range by which a feature may go beyond it."""
 
 
 def region_of(rows: Floats, block: NDArray[np.int64], weight: Floats | None = None, inside: float = INSIDE) -> Region:

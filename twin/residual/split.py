@@ -17,7 +17,7 @@ Places = NDArray[np.intp]
 FORGOTTEN = 0.1
 TIME_CONSTANTS = 3.0
 GAP_SHARE_MAX = 0.125
-"""Of the recorded time; a residual that remembers longer than that is a constant to this recording."""
+"""Largest part of the recorded time for a gap; a residual that remembers longer is a constant to this recording."""
 BLOCKS_MIN = 8
 GRID_S = 60.0
 

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 IDEAL_TIMES = Program(
     rapid_mm_min=RAPID_MM_MIN, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0
 )
-"""What a program is planned with where neither [program] nor an effect of the machine tells of its control: a middling one."""
+"""A middling control: used to plan a program where neither [program] nor an effect of the machine describes its own."""
 TICKS_MAX = 8_000_000
 
 
@@ -124,7 +124,7 @@ def simulate(
     ]
     notes += _saturated(machine, response)
     if assumed := assumed_in_words(machine):
-        notes.append(f"assumed, as nobody has stated or fitted it: {assumed}")
+        notes.append(f"assumed, neither stated nor fitted: {assumed}")
     learned_s = seconds_of(machine.learned, planned.total_s)
     if learned_s:
         notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")
@@ -175,7 +175,9 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     none = {name: np.zeros(ticks) for name in ("axial_depth_mm", "entry_angle_rad", "exit_angle_rad")}
     if machine.stock is None or machine.tool is None:
         if (path.kind != Kind.RAPID).any():
-            notes.append(f"no [{'stock' if machine.stock is None else 'tool'}]: the program is run in air")
+            one_only = " (simulate knows one tool, [tool]; cnctwin expect knows [tools.N])" if machine.tools else ""
+            missing = "[stock]" if machine.stock is None else f"[tool]{one_only}"
+            notes.append(f"no {missing}: the program is run in air")
         return none
     if path.axes[:3] != ("x", "y", "z") or not len(path):
         return none

@@ -20,7 +20,7 @@ OUTSIDE = 0.02
 SIDE = 0.1
 """Share that beginning and end have at least, each."""
 MARGIN = 0.08
-"""Of the transient's length, that beginning and end reach beyond their activity on each side."""
+"""Part of the transient's length by which beginning and end reach beyond their activity on each side."""
 
 FLAT = 0.25
 """A beginning or end that deviates by less than this share of the whole is none."""

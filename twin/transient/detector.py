@@ -27,12 +27,12 @@ from twin.transient.warping import BAND, shape_of, warped_distance
 
 Floats = NDArray[np.float64]
 FEATURES = ("correlation", "likeness", f"{FEED} at rest", f"{BLOCK} stands")
-"""What the evidence is weighed by: rho of the pattern, 1 − half its warped distance, and the two run lengths."""
+"""Features that weigh the evidence: rho of the pattern, 1 − half its warped distance, and the two run lengths."""
 HAVE_TYPICAL = (False, False, True, True)
 """Which of them should be neither smaller nor larger than in the captures."""
 
 MATCHED_S = 0.04
-"""What takes seconds is looked for so often at most, however finely it is sampled."""
+"""Least time between two searches for a pattern that takes seconds, however finely it is sampled."""
 DISTANCE_ANY = 2.0
 """No two standardised shapes are further apart along the best path."""
 

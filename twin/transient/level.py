@@ -17,7 +17,7 @@ SPEED = "spindle_rpm"
 SIGNALS = (SPEED, "spindle_current_a", "spindle_load_pct")
 SPEED_KNEE_RPM = 100.0
 QUANTA = 2**12
-"""Of one standard deviation of the captured transients."""
+"""Quanta in one standard deviation of the captured transients."""
 QUANTA_MAX = 2**19
 
 

@@ -16,7 +16,7 @@ from twin.transient.errors import TransientError
 Floats = NDArray[np.float64]
 STRETCHES = tuple(float(value) for value in np.round(np.geomspace(0.7, 1.5, 13), 4))
 SAMPLES_MAX = 6000
-"""Of a whole pattern at its longest: so that sums of squares stay below 2^53."""
+"""Most samples of a whole pattern at its longest, so that sums of squares stay below 2^53."""
 
 
 @dataclass(frozen=True, eq=False)

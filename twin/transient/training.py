@@ -31,7 +31,7 @@ MARGIN = 0.95
 LOOKED_AT_RHO = 0.3
 """Below this a part is not even looked at."""
 KNOWN_FROM = 0.1
-"""Where fewer false gates than this are to be expected in the null stream, its tail says nothing of their rate."""
+"""Fewest false gates expected in the null stream from which its tail gives their rate."""
 SCORE_MAX = 0.999
 SMALLER, LARGER = 0.5, 2.0
 """A change may be so much smaller or larger than those captured."""

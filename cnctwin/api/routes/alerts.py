@@ -100,7 +100,7 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
         body: Acknowledgement,
         request: Request,
     ) -> Any:
-        """Say that somebody takes care of an alert: it is not repeated and goes to nobody else."""
+        """Say that somebody takes care of an alert: it is neither repeated nor escalated."""
         by = _signed(request, body.by)
         state = _kept_up(live)
         alert = _one(state, fingerprint)

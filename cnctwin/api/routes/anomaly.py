@@ -37,7 +37,7 @@ class VerdictRequest(BaseModel):
     )
     verdict: Literal["true", "false", "known"]
     label: str = Field(
-        "", max_length=60, pattern=LINE, description="what it was, in a few words; later alarms that look like it are told so"
+        "", max_length=60, pattern=LINE, description="what it was, in a few words; later alarms that look like it name it"
     )
     by: str = Field("", max_length=100, pattern=LINE)
     alarm_at_s: float | None = Field(
@@ -51,11 +51,11 @@ class Anomaly(Answer):
 
     machine: MachineName
     now: T
-    is_alarm: bool | None = Field(description="null: no threshold, no score, or nobody computes them")
+    is_alarm: bool | None = Field(description="null: no threshold, no score, or no processor computes them")
     score: float | None
     threshold: float | None
     why: dict[str, Any] | None = Field(description="signal, scale, program, tool, lines, measured, expected, by, like, peers, …")
-    why_t: int | None = Field(description="when the reason was told, ms since 1970")
+    why_t: int | None = Field(description="when the reason was reported, ms since 1970")
     knows: str | None = Field(description="what the score knows of the program that runs", examples=["12 parts"])
     verdicts: dict[str, Any] | None = Field(description="alarms, limits that were raised, outcomes, precision, suggestion")
     reason: str | None

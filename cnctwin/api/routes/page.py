@@ -46,7 +46,7 @@ def page_routes(access: Access, failures: Failures) -> APIRouter:
     async def login(body: Token, request: Request) -> Response:
         """Give the token once; the answer sets a cookie that no script can read, for twelve hours."""
         if not access.has_tokens:
-            raise ApiError(404, "this server has no token; nobody has to log in")
+            raise ApiError(404, "this server has no token; no login is needed")
         user = access.bearer(body.token)
         if user is None:
             if wait_s := failures.add(request.state.client, time.monotonic()):

@@ -14,7 +14,7 @@ from cnctwin.api.door.role import Role
 class Me(Answer):
     """The person who asks, and what their role may do."""
 
-    user: str | None = Field(description="null where nobody has a name: on loopback, or with the one token", examples=["ada"])
+    user: str | None = Field(description="null where users have no names: on loopback, or with the one token", examples=["ada"])
     role: str = Field(description="reader, operator or administrator", examples=["operator"])
     logs_out: bool = Field(description="whether there is a session to end")
 

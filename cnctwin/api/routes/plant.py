@@ -16,7 +16,7 @@ from sparkplug.clock import now_ms
 
 NAMES_SHOWN = 20
 Machine = Annotated[str, Path(description="Its name: the Sparkplug device", max_length=200, examples=["vmc"])]
-UNKNOWN: dict[int | str, dict[str, Any]] = {404: {"model": Problem, "description": "Nobody has heard of this machine"}}
+UNKNOWN: dict[int | str, dict[str, Any]] = {404: {"model": Problem, "description": "This machine is not known"}}
 BUSY: dict[int | str, dict[str, Any]] = {503: {"model": Problem, "description": "A part is missing or busy; the line says which"}}
 
 

@@ -59,7 +59,7 @@ def ack(
     broker: Broker = None,
     wait_s: Wait = 5.0,
 ) -> None:
-    """Say that somebody takes care of an alert: it is not repeated and goes to nobody else."""
+    """Say that somebody takes care of an alert: it is neither repeated nor escalated."""
     with alert_desk(address(broker), wait_s) as desk:
         alert = _one(desk.state, fingerprint)
         fields = {"fingerprint": alert["fingerprint"], "episode": alert["episode"]}

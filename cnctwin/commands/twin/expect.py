@@ -153,7 +153,7 @@ def _shown(made: "Expectation", program: Path, path: Path | None, *, as_json: bo
     if as_json:
         return answer
     table = Table(title=f"{program.name} on {made.machine}: {made.time_s:.1f} s", title_justify="left")
-    for column in ("tool", "time s", "lines", "peak load %", "peak force N", "lines without load"):
+    for column in ("tool", "time s", "lines", "peak load %", "peak of the mean tangential force N", "lines without load"):
         table.add_column(column, justify="right")
     for one in summary:
         load = "–" if one.load_pct is None else f"{one.load_pct:.1f}"

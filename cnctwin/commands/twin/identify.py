@@ -91,7 +91,8 @@ def identify(
     console.print()
     console.print(_gap_table(found.gaps))
     if out is not None:
-        console.print(f"the identified machine is in {out}", markup=False, highlight=False, soft_wrap=True)
+        doubt = "; it does not fit its recordings: do not rely on it" if found.misfits else ""
+        console.print(f"the identified machine is in {out}{doubt}", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(code)
 
 

@@ -244,7 +244,7 @@ def _show(found: "Optimised", console: Console) -> None:
     table.add_row("time", f"{before.seconds:.2f}", f"{after.seconds:.2f}", "s")
     if before.cost is not None and after.cost is not None:
         table.add_row("cost", f"{before.cost:.2f}", f"{after.cost:.2f}", found.currency)
-    table.add_row("greatest cutting force", f"{before.force_n:.1f}", f"{after.force_n:.1f}", "N")
+    table.add_row("greatest resultant force", f"{before.force_n:.1f}", f"{after.force_n:.1f}", "N")
     table.add_row("greatest power", f"{before.power_kw:.3g}", f"{after.power_kw:.3g}", "kW")
     table.add_row("greatest torque", f"{before.torque_nm:.3g}", f"{after.torque_nm:.3g}", "N·m")
     table.add_row("greatest chip", f"{1000 * before.chip_mm:.1f}", f"{1000 * after.chip_mm:.1f}", "µm")
@@ -253,12 +253,10 @@ def _show(found: "Optimised", console: Console) -> None:
     console.print(f"bound: {found.bound.value:.2f} ({found.bound.how})", markup=False, highlight=False, soft_wrap=True)
     seconds: dict[str, float] = {}
     for line in found.lines:
-        seconds[line.binds or "left alone"] = seconds.get(line.binds or "left alone", 0.0) + line.after.seconds
-    total = sum(seconds.values())
-    if total > 0.0:
-        most = sorted(seconds.items(), key=lambda one: -one[1])[:BINDS_SHOWN]
-        what = ", ".join(f"{100 * spent / total:.0f} % {binds}" for binds, spent in most)
-        console.print(f"what binds, by time: {what}", markup=False, highlight=False, soft_wrap=True)
+        binds = line.binds or ("" if line.left_alone else "no limit")
+        seconds[binds] = seconds.get(binds, 0.0) + line.after.seconds
+    if sum(seconds.values()) > 0.0:
+        console.print(_what_binds(seconds), markup=False, highlight=False, soft_wrap=True)
     if found.sensitivity is not None:
         known = found.sensitivity
         price = f"{known.price_pct:+.1f} % {'time' if found.objective == 'time' else 'cost'}".replace("-", "−")
@@ -274,6 +272,22 @@ def _show(found: "Optimised", console: Console) -> None:
         console.print(_front_table(found))
     for note in found.notes:
         console.print(f"note: {note}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _what_binds(seconds: dict[str, float]) -> str:
+    """Return what binds by its part of the time, from the time in s by what binds; "" = the time in lines left alone.
+
+    >>> _what_binds({"": 6.7, "cutting force": 2.3, "feed range": 1.0})
+    '67 % of the time is in lines left alone; what binds in the others: cutting force 23 %, feed range 10 %'
+    """
+    total = sum(seconds.values())
+    alone = seconds.get("", 0.0)
+    most = sorted(((spent, binds) for binds, spent in seconds.items() if binds), reverse=True)[:BINDS_SHOWN]
+    what = ", ".join(f"{binds} {100 * spent / total:.0f} %" for spent, binds in most)
+    if not alone:
+        return f"what binds, by time: {what}"
+    told = f"{100 * alone / total:.0f} % of the time is in lines left alone"
+    return f"{told}; what binds in the others: {what}" if what else told
 
 
 def _front_table(found: "Optimised") -> Table:

@@ -196,7 +196,7 @@ def _folder(machine: str, given: Path | None) -> "MachineFolder":
         raise UsageError(f"{where}; give --machines DIR or ${VARIABLE}, with {machine}.toml in it (docs/how-to/loop.md)")
     own = MachineFolder(folder, machine)
     if machine not in (known := described(folder)):
-        raise UsageError(f"{folder}: nobody has described {machine!r}; there are {', '.join(known) or 'no machines'}")
+        raise UsageError(f"{folder}: no description of {machine!r}; there are {', '.join(known) or 'no machines'}")
     return own
 
 
@@ -232,7 +232,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
 
     live, challenger, score = found["live"], found["challenger"], found["score"]
     if live is None:
-        yield f"{found['machine']}: nobody has described it yet; a challenger waits"
+        yield f"{found['machine']}: not described yet; a challenger waits"
     else:
         why = f": {live['why']}" if live["why"] else ""
         yield f"{found['machine']}: {live['version']} is live since {moment_text(live['since'])} UTC, by {live['by']}{why}"

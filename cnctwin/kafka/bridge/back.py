@@ -209,7 +209,7 @@ def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:
             known = {machine: latest_of(told) for machine, told in document["live"]["machines"].items()}
             online = {machine: moment["machines"][machine]["online"] for machine in known}
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-            _log.warning("%s: no state that can be read, so the twin is told with its next news: %s", key, one_line(error))
+            _log.warning("%s: cannot read its state, so the twin is announced with its next message: %s", key, one_line(error))
             continue
         for machine, latest in known.items():
             if any("/twin-" not in node for node in online[machine]):

@@ -14,7 +14,10 @@ def constants(diagnosis: Diagnosis) -> Markup | None:
     if not moved:
         return None
     far = sum(one.deviations > FAR for one in moved)
-    lead = "The refitted constants of the machine that take up a part of the gap as stated."
+    lead = (
+        "The refitted constants of the machine that take up a part of the gap as stated, each by itself: what two of them can "
+        "both take up is counted twice, so the shares need not add up to 100 %."
+    )
     if far:
         lead += f" {far} of them moved by more than two of the deviations that the file states: that is a finding."
     head = tag("tr", *(tag("th", t, scope="col") for t in ("Constant", "Stated", "Found", "Moved by", "Takes of the gap")))

@@ -22,7 +22,7 @@ Table = dict[tuple[str, str], Cell]
 def where(diagnosis: Diagnosis) -> Markup:
     """The section, its first sentences those of the largest cells."""
     if not diagnosis.where:
-        return section("where", "Where it is", "No part of the recordings was told apart.")
+        return section("where", "Where it is", "The recordings could not be split into parts.")
     found = [cell for cell in diagnosis.where if cell.discovered and cell.sentence]
     first = stated(found[0].sentence) if found else "No part of it stands out from what repeated runs differ by."
     more = each("li", (stated(cell.sentence) for cell in found[1:SENTENCES_MAX]))

@@ -23,6 +23,10 @@ _OTHER = {
     "spindle_rpm": "Spindle speed",
     "vibration_rms_g": "Vibration",
     "program_time_s": "Program time",
+    "spindle_angle_rad": "Spindle angle",
+    "axial_depth_mm": "Axial depth",
+    "entry_angle_rad": "Entry angle",
+    "exit_angle_rad": "Exit angle",
 }
 _REGIMES = (
     *("rest", "reversal", "acceleration", "constant speed −", "constant speed +", "rapid"),

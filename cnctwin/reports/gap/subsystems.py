@@ -9,7 +9,7 @@ from twin.gap.diagnosis import Diagnosis, Subsystem, Verdict
 
 _ORDER = ("controller", "mechanics", "table", "cut", "spindle load", "heat", "program", "clock")
 _WORD = {
-    Verdict.HEALTHY: "as told",
+    Verdict.HEALTHY: "healthy",
     Verdict.EXPLAINED: "explained",
     Verdict.PARTLY: "partly explained",
     Verdict.UNKNOWN: "not understood",

@@ -39,7 +39,7 @@ class Shown:
 
 
 PANELS = (
-    Shown("force", "Greatest cutting force of the line", "N", 170, lambda c: c.force_n),
+    Shown("force", "Greatest resultant force of the line", "N", 170, lambda c: c.force_n),
     Shown("feed", "Feed", "mm/min", 120, lambda c: c.feed_mm_min),
     Shown("speed", "Spindle speed", "rev/min", 120, lambda c: c.spindle_rpm),
 )

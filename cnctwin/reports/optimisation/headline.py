@@ -62,7 +62,7 @@ def figures(answer: Optimised) -> Markup:
     limit = limit_text(answer.limits, "force")
     force = to(column(before.force_n, 3), column(after.force_n, 3))
     tiles.append(
-        tile("Greatest cutting force, N", force, f"limit {shortened(limit, 60)}" if limit else "no limit of force was set")
+        tile("Greatest resultant force, N", force, f"limit {shortened(limit, 60)}" if limit else "no limit of force was set")
     )
     reached = "which a program reaches: exact" if answer.bound.exact else "which no program need reach"
     tiles.append(tile("Above the bound", percent(answer.bound.distance), reached))

@@ -17,7 +17,7 @@ def resimulated(answer: Optimised) -> Markup:
         return section("again", title, "It was not: the figures above are those of the search.")
     rows = [
         _row("Time", "s", given.seconds, 4),
-        _row("Greatest cutting force", "N", given.force_n, 3),
+        _row("Greatest resultant force", "N", given.force_n, 3),
         *(
             _row(f"Greatest following error of {axis.upper()}", "mm", pair, 3)
             for axis, pair in sorted(given.following_error_mm.items())

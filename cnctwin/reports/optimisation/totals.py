@@ -41,7 +41,7 @@ def totals(answer: Optimised) -> Markup:
         compared.append((Compared("Cost", answer.currency, before.cost, after.cost), "cost"))
     rows = [_row(row, *(_bound(answer, of) if of == bounds(answer) else (NONE, NONE))) for row, of in compared]
     limited = (
-        (Compared("Greatest cutting force", "N", before.force_n, after.force_n), "force"),
+        (Compared("Greatest resultant force", "N", before.force_n, after.force_n), "force"),
         (Compared("Greatest spindle power, electrical", "kW", before.power_kw, after.power_kw), "power"),
         (Compared("Greatest torque, mean over a turn", "N·m", before.torque_nm, after.torque_nm), "torque"),
         (Compared("Greatest chip thickness", "µm", 1000.0 * before.chip_mm, 1000.0 * after.chip_mm), "chip"),

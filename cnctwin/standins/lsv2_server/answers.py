@@ -289,7 +289,7 @@ class Answers:
         return self._packet(session, session.sweep)
 
     def _packet(self, session: Session, sweep: Sweep) -> bytes:
-        assert self.trace is not None, "nobody selects signals without it"
+        assert self.trace is not None, "signals cannot be selected without a trace"
         if sweep.is_overrun(self.control.machine_s()):
             session.sweep = None
             return encode("T_BD", bytes([1, Code.OSCILLOSCOPE_OVERRUN]))

@@ -50,6 +50,6 @@ def moments_of(lines: Iterable[str]) -> Iterator[Moment]:
     """
     origin_s: float | None = None
     for line in parse_lines(lines):
-        assert isinstance(line, Line), f"a line that nobody tells: {line}"
+        assert isinstance(line, Line), f"not a line of the agent: {line}"
         origin_s = line.stamp.seconds if origin_s is None else origin_s
         yield Moment(round(line.stamp.seconds - origin_s, 6), dict(zip(line.fields[::2], line.fields[1::2], strict=True)))

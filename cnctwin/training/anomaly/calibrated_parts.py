@@ -29,7 +29,7 @@ from twin.anomaly.threshold import Threshold, fit_threshold
 
 MAD_TO_SD = 1.4826
 SPREAD_LEAST = 1e-3
-"""Of a raw score that is nearly always the same, in tails of healthy parts."""
+"""Least spread of a raw score, in tails of healthy parts; one that is nearly always the same has less."""
 
 
 def calibrated_parts(

@@ -103,7 +103,8 @@ def sentences_of(done: Trained, asked: TrainingSettings) -> list[str]:
     said.append(_held_back(done))
     if detector.weighing is not None:
         said.append(
-            f"feed and block are weighed where they are told: {done.weighed_peaks} false gates in {rate.null_hours:.2f} h of null"
+            "feed and block are weighed where they are reported: "
+            f"{done.weighed_peaks} false gates in {rate.null_hours:.2f} h of null"
         )
     return said
 

@@ -92,7 +92,7 @@ LINES = (
     lines("Bridges: waiting", "Records that the cluster has not acknowledged.", "max(twin_kafka_bridge_waiting)", "waiting"),
     lines(
         "Bridges: dropped",
-        "Records that found no room; the folds are told of a hole.",
+        "Records that found no room; a hole is reported to the folds.",
         _largest_rate("twin_kafka_bridge_dropped_total"),
         "dropped",
         unit=PER_S,

@@ -9,7 +9,7 @@ from edge.errors import ConnectionLostError
 from edge.sample import UNAVAILABLE, EdgeSample, Offer
 from edge.sweep import Sweep
 
-NO_TOOL = "this control tells it to nobody over LSV2; give its PLC address as plc.tool_number, or let program_text be true"
+NO_TOOL = "this control does not report it over LSV2; give its PLC address as plc.tool_number, or let program_text be true"
 
 
 def describe(config: Config) -> list[Row]:

@@ -71,7 +71,7 @@ class ToolAsset:
                 continue
             yield (
                 used,
-                _life(used, life.used(), f"tool {self.id}: ToolLife without a value, or counted down from nobody knows what"),
+                _life(used, life.used(), f"tool {self.id}: ToolLife without a value, or counted down from an unknown value"),
             )
             yield limit, _life(limit, life.most(), f"tool {self.id}: the control sets no limit")
         yield "tool_length_mm", self._measured("tool_length_mm", _LENGTHS, 1.0)

@@ -86,7 +86,7 @@ def test_one_speed_for_a_tool_is_asked_for_and_told(tmp_path: Path) -> None:
         (("--stock", "0:80,0:60"), 2, "--stock 0:80,0:60: is not a box; write the edges of the block as X0:X1,Y0:Y1,Z0:Z1 in mm"),
         (("--stock", "80:0,0:60,-20:0"), 2, "--stock 80:0,0:60,-20:0: min_mm 80.0 is not below max_mm 0.0 in x"),
         (("--pick", "1"), 2, "pick is 1, and the objective time; only a front has programs to pick from"),
-        (("--leave", "9999"), 2, "line 9999 is to be left alone, and is no line that feeds"),
+        (("--leave", "9999"), 2, "line 9999 cannot be left alone: it is not a line that feeds"),
         (("--population", "5"), 2, "population is 5; it has to be even"),
         (("--probability", "2"), 2, "the probability is 2.0"),
     ],

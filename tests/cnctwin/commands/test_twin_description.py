@@ -84,7 +84,7 @@ def test_the_folder_is_found_by_the_environment(
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        (("show", "lathe"), 2, "nobody has described 'lathe'; there are vmc"),
+        (("show", "lathe"), 2, "no description of 'lathe'; there are vmc"),
         (("show", "../vmc"), 2, "cannot name a file"),
         (("promote", "vmc", "--force"), 2, "--force takes --why"),
         (("promote", "vmc", "--version", "ffff"), 2, "0 versions begin with 'ffff'"),

@@ -78,8 +78,8 @@ def test_what_nobody_accepts_is_no_success_and_a_consumer_that_comes_late_is_ask
 ) -> None:
     code, _, err = cnctwin_jobs("submit", "--job", "diagnose", "--case", "x", "--id", "a", "--wait", "0.5")
     assert code == 1
-    assert "nobody has accepted a within 0.5 s" in err
-    assert "is `cnctwin jobs run` there? It is safe to send it again" in err
+    assert "a was not accepted within 0.5 s" in err
+    assert "is `cnctwin jobs run` running? It is safe to send it again" in err
     code, _, err = cnctwin_jobs("list", "--wait", "0.5")
     assert code == 1
     assert "knows nothing of jobs" in err

@@ -104,7 +104,7 @@ def test_a_mill_of_each_class_cuts_the_plate(machine_class: str) -> None:
     assert 20.0 < done.seconds < 200.0
     assert 10.0 < np.nanmax(done.run["cutting_force_peak_n"]) < 5000.0
     assert all(np.abs(error).max() < 20.0 for error in done.following_error_mm().values())
-    assert any(note.startswith("assumed, as nobody has stated or fitted it: ") for note in done.notes)
+    assert any(note.startswith("assumed, neither stated nor fitted: ") for note in done.notes)
 
 
 def test_a_lathe_turns_a_program_in_air() -> None:

@@ -135,7 +135,7 @@ def test_the_gap_has_a_place_a_cause_and_a_next_step(visit: Visit) -> None:
         "no force_x_n",
         "Next experiment",
         "Z mechanics",
-        "as told",
+        "healthy",
         "A force on X of +43 N between 118 and 141 mm",
         "direction friction on X, but it closes 31 %",
         "axes.y.mass_kg",

@@ -77,7 +77,7 @@ def test_a_connected_machine_that_nobody_has_described_is_named_with_the_way_out
     (line,) = said(LiveDescriptions(), "okuma")
     assert line == (
         True,
-        "okuma: nobody has described it, so its constants are assumed; write machines/okuma.toml, "
+        "okuma: not described, so its constants are assumed; write machines/okuma.toml, "
         "or `cnctwin identify --store STORE --machine okuma --out okuma.toml` fits one",
     )
 

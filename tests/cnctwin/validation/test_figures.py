@@ -141,7 +141,7 @@ def test_without_a_reference_nothing_is_made_up() -> None:
     evidence, _ = shaking(0.01)
     (vibration,), (force,) = judged_vibration(evidence, BUDGETS), judged_force(told_twin(), evidence, BUDGETS)
     assert (vibration.verdict, vibration.value) == (Verdict.UNSEEN, None) and "no reference" in (vibration.reason or "")
-    assert (force.verdict, force.value) == (Verdict.UNSEEN, None) and "nobody measured the force" in (force.reason or "")
+    assert (force.verdict, force.value) == (Verdict.UNSEEN, None) and "the force was not measured" in (force.reason or "")
 
 
 def cutting(scale: float, floor_n: float = 5.0) -> tuple[Evidence, RunLog]:

@@ -183,11 +183,11 @@ def test_what_is_published_is_on_the_broker_as_metrics_and_as_plain_json(
 
 def test_a_metric_without_a_value_is_a_null_that_says_why(tmp_path: Path) -> None:
     figure = {"quantity": "force", "measure": "mape", "on": "", "value": None, "unit": "%", "budget": 20.0,
-              "verdict": "not observable", "reason": "nobody measured the force"}  # fmt: skip
+              "verdict": "not observable", "reason": "the force was not measured"}  # fmt: skip
     kept({"night": "2026-11-21", "t": 1, "verdict": "not observable", "twin": "a", "figures": [figure]}, "vmc", tmp_path)
     _, changes = metrics(validation_of("vmc", tmp_path))
     (null,) = [one for one in changes if one.name == f"{PREFIX}force_mape"]
-    assert null.value is None and null.reason == "nobody measured the force"
+    assert null.value is None and null.reason == "the force was not measured"
 
 
 def test_the_sample_configuration_holds_the_defaults() -> None:

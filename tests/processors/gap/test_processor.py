@@ -101,7 +101,7 @@ def test_where_a_tool_change_is_not_known_nothing_is_compared_and_where_nobody_t
     ungated = engine_of(PROCESSOR, floors=FLOORS, **DRIVE)
     fed(ungated, birth(0.0, tool_change_active=None, tool_change_source="none", **TURNING), *minutes(5, **TURNING))
     assert last(ungated)[LOAD].value is not None
-    assert last(ungated)[BASIS].value.endswith("tool changes are not gated: nobody tells them")
+    assert last(ungated)[BASIS].value.endswith("tool changes are not gated: no signal reports them")
 
 
 def test_where_the_control_tells_nothing_the_detector_is_heeded() -> None:

@@ -129,7 +129,7 @@ def test_each_tool_of_a_table_cuts_with_its_own_diameter() -> None:
     other = expectation_of(machine(), text, tools={"2": thin.model_copy(update={"diameter_mm": 5.0})})
     assert {run.diameter_mm for run in other.runs if run.diameter_mm} == {5.0}
     unknown = expectation_of(machine(), text.replace("Y18.", "Y18.\nT3 M6"), tools={"2": thin})
-    assert any("tool 3 is not described: write [tools.3]" in sentence for sentence in unknown.basis)
+    assert any("tool 3 is not described: write [tools.3] if it is an end mill; a drill" in sentence for sentence in unknown.basis)
 
 
 def test_a_pass_that_runs_again_cuts_air_the_second_time() -> None:

@@ -117,6 +117,7 @@ def test_a_sign_that_is_wrong_is_said_to_fit_nothing() -> None:
     runs = tuple(RecordedRun(role, RunKind.AIR, role, turned) for role in ("fit", "check"))
     found = identify(Case("turned", stated(mass=1.0, coulomb=1.0, viscous=1.0), runs))
     assert any("x_torque_a is missed" in sentence for sentence in found.misfits), found.misfits
+    assert all("cnctwin gap diagnose CASE" in sentence for sentence in found.misfits)
     assert not found.machine.effects, "a velocity from the future is no finding"
 
 

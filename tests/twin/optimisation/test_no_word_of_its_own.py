@@ -69,13 +69,13 @@ def test_a_line_that_runs_at_what_another_leaves_has_that_one_left_alone_too() -
     """The first move of APPR has the feed of the block before, the second its own F: no word of APPR gives it both."""
     found = answer(APPROACH, "a.h", force_limit_n=60.0)
     why = {one.line: one.left_alone for one in found.lines}
-    assert "feed does not follow" in why[5]
-    assert why[4].startswith("line 6 behind it is left alone")
+    assert why[5].startswith("a new F word here would not set its feed")
+    assert why[4].startswith("line 6 after it is left alone")
     assert [written for written in source_lines(found.program) if "APPR" in written or "X-50" in written] == [
         "4 L X-50 Y-40 R0 F500",
         "5 APPR LT X+25 Y+30 LEN10 RL F600",
     ]
-    assert any("line 5 (line 6 behind it" in note for note in found.notes)
+    assert any("line 5 (block 4): line 6 after it" in note and "line 6 (block 5): a new F word" in note for note in found.notes)
     assert found.after.seconds < found.before.seconds
 
 

@@ -154,6 +154,13 @@ def test_what_the_machine_does_not_state_is_said() -> None:
     assert "no [axes.y]" in notes
 
 
+def test_a_machine_with_numbered_tools_alone_is_sent_to_the_command_that_knows_them() -> None:
+    numbered = MACHINE.model_copy(update={"tool": None, "tools": {"1": MACHINE.tool}})
+    assert any(
+        "no [tool] (simulate knows one tool" in note and "cnctwin expect" in note for note in simulate(numbered, SLOT).notes
+    )
+
+
 def test_a_rapid_through_the_stock_is_said_with_its_line() -> None:
     notes = simulate(MACHINE, "G0 X-5 Y15 Z-5\nG0 X35\nM30\n").notes
     assert any(note.startswith("line 2: rapid into material") for note in notes), notes

@@ -26,7 +26,7 @@ SMALL = 0.5
 WHY_FROM = 1.0
 FEELS, FEELS_ENERGY = 0.3, 0.2
 """A machine asks what its peers feel where its load is so many spreads away, its vibration's energy so much above the usual."""
-NOTHING_TOLD = "nothing was told yet of a cut that is known"
+NOTHING_TOLD = "no known cut has been reported yet"
 
 
 def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:

@@ -13,7 +13,7 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 Mark = tuple[int, float]
-"""Where a section begins: line, mm along it; −1 and s as programmed where no line is told."""
+"""The beginning of a section: line and mm along it; −1 and s as programmed where the control reports no line."""
 NO_LINE = -1
 USES_MAX = 100
 BACK_SHARE = 0.1

@@ -28,7 +28,7 @@ LINE_TICKS_MIN = 3
 STEPS_MIN = 100
 OVERRIDES_APART = 0.3
 STEADY_QUANTILE = 0.7
-"""Of the ticks of a line, above its edges in air."""
+"""Quantile of the load over the ticks of a line: its steady cut, above its edges in air."""
 VIBRATION_POWER = 0.5
 TWIN_CLIP = 3.0
 

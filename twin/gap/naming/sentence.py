@@ -65,11 +65,11 @@ def _most(cells: Sequence[Cell]) -> str:
 
 
 def _parts(subsystems: Sequence[Subsystem]) -> list[str]:
-    """Return the parts that are not as told, worst first, and before them the controllers of the same axes that are."""
+    """Return the parts that are not healthy, worst first, and before them the controllers of the same axes that are."""
     wrong = [s for s in subsystems if s.verdict is not Verdict.HEALTHY][:SUBSYSTEMS_MAX]
     axes = {s.subsystem.partition(" ")[0] for s in wrong}
     told = [s for s in subsystems if s.verdict is Verdict.HEALTHY and s.subsystem in {f"{axis} controller" for axis in axes}]
-    said = [f"{_part(s)} as told" for s in told]
+    said = [f"{_part(s)} healthy" for s in told]
     for part in wrong:
         named = f", in {_joined(part.causes)}" if part.causes else ""
         said.append(f"{_part(part)} {part.before:.2g} floors{named}")

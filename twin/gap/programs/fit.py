@@ -45,13 +45,13 @@ DETERMINED = 0.7
 """The runs know a parameter where its logarithm has less than this part of its spread before them."""
 Z_90 = 1.6448536269514722
 LONG_WINDOW_S = 10.0
-"""What is judged: the recorder's error is at the ends of a window only; in a long one little gaps add up to what is seen."""
+"""Length of the windows that are judged: the recorder errs at the ends of a window only, and in a long one small gaps add up."""
 BLOCK_WINDOWS = 10
 SMALLEST = 1e-4
 ENOUGH = 1e-4
 STEP = 1e-3
 INSIDE = 1e-6
-"""Of the search: what counts as no gain, the step of a difference, how far from a bound it begins."""
+"""Settings of the search: a gain that counts as none, the step of a difference, the distance from a bound at its start."""
 
 
 @dataclass(frozen=True)

@@ -39,11 +39,11 @@ MATERIAL = 0.003
 NOTHING_LEFT = 4.0
 """A set that leaves up to this many times the recorder's own energy needs nothing more."""
 SIGNIFICANT = 0.01
-"""Of all candidates together: each is held to its part."""
+"""Level of significance of all candidates together: each is held to its part."""
 DRAWS = 999
 PROBE = 0.1
 NOISE_MOST_S = 3.0
-"""What is left of a window counts up to this as what may be by chance."""
+"""Largest remainder of a window that counts as chance."""
 AS_WELL = 0.05
 """Part of the resampled runs in which another effect has to be as good to be said not to be told apart."""
 AT_BOUND = 1e-3

@@ -17,7 +17,7 @@ from twin.optimisation.speeds.groups import speed_groups
 from twin.optimisation.speeds.stretches import changes_in_material, executions
 
 SMALL = 5e-4
-"""Of time or cost; what is less than this is nothing to be told."""
+"""Part of time or cost below which a note is not worth making."""
 TOOLS_MAX = 12
 
 

@@ -204,7 +204,7 @@ HANDLERS: Final[Mapping[str, Callable[[State, Words], None]]] = {
     "rotation": offsets.rotation,
     "once": once,
 }
-"""What the codes of a group do that is more than a mode, in the order in which it is done."""
+"""Handlers of the groups whose codes do more than set a mode, in the order in which they act."""
 
 
 def go(state: State, words: Words) -> None:

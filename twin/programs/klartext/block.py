@@ -120,7 +120,9 @@ def parse(source: Source, begin: int, allowed: frozenset[str], flags: frozenset[
         else:
             if not (owner == 140 and index == 1):
                 owner = 0
-            take_flag(block, match, index, text, flags)
+            head = written[begin:first]
+            whole = begin + max(head.rfind(" "), head.rfind("\t")) + 1  # F3OO, of which F3 was read
+            take_flag(block, match, index, text if index < 8 else written[whole:at].strip(), flags)
     return block
 
 

@@ -17,7 +17,7 @@ from twin.programs.planes import PLANES
 from twin.programs.refusal import RefusedError
 
 Shape = Callable[[State, Block, bool, bool], None]
-"""What draws a block: FMAX or not, leaving a contour or not."""
+"""A function that draws a block: FMAX or not, leaving a contour or not."""
 NEAR_MM: Final = 1e-9
 TURNS_MAX: Final = 100_000.0
 
@@ -124,7 +124,7 @@ def circle(state: State, block: Block, rapid: bool, leaves: bool) -> None:
     end = with_superimposed(state, block, motion.target(state, block), normal)
     start_point = (state.position[first], state.position[second])
     turn = clockwise(state, block, plane)
-    swept = by_centre(start_point, (end[first], end[second]), centre, turn, state.settings.arc_radius_error_mm_max)
+    swept = by_centre(start_point, (end[first], end[second]), centre, turn, state.settings.arc_radius_error_mm_max, "CC")
     put_arc(state, end, swept, plane, leaves)
 
 
@@ -137,7 +137,7 @@ def circle_polar(state: State, block: Block, rapid: bool, leaves: bool) -> None:
     end = with_superimposed(state, block, end, normal)
     turn = clockwise(state, block, plane)
     start_point, end_point = (state.position[first], state.position[second]), (end[first], end[second])
-    swept = by_centre(start_point, end_point, centre, turn, state.settings.arc_radius_error_mm_max)
+    swept = by_centre(start_point, end_point, centre, turn, state.settings.arc_radius_error_mm_max, "CC")
     if "IPA" in block.values:
         if turned == 0.0 or (turned > 0.0) != (block.direction == 1):
             raise RefusedError(block.texts["IPA"], "IPA and DR have to have the same sign")

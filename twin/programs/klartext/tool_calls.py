@@ -26,7 +26,7 @@ def call(source: Source, begin: int) -> Callable[[State], None]:
     # The delta of the corner radius changes no path in the plane.
     body = DR2.sub(lambda found: " " * len(found.group()), source.body)
     block = parse(source._replace(body=body), match.end(), frozenset({"S", "DL", "DR"}))
-    word = source.written[match.start() : match.end()].strip()
+    word = source.written[match.start() : match.end() if match.group(4) is None else match.start(4)].strip()
     name = source.written[match.start(1) : match.end(1)] if match.group(1) is not None else None
     string = int(match.group(2)[:9]) if match.group(2) else None
     number = value(match.group(3), word) if match.group(3) else None

@@ -27,7 +27,7 @@ OWN: Final = re.compile(
 )
 """Words that no other language has."""
 OUTSIDE: Final = re.compile(r"\([^()\n]*+\)|(?<=;)(?!\$PATH).*+")
-"""What stands in brackets, a comment elsewhere, and behind `;`: it tells nothing of the language."""
+"""Text in brackets, a comment in other languages, and after `;`: it does not show the language."""
 COMMENT: Final = re.compile(r"^[ \t]*+;", re.M)
 PLAIN: Final = re.compile(r"(?<![A-Z_])[GMXYZ][ \t]*+[-+]?+\.?+[0-9]", re.I)
 

@@ -149,7 +149,8 @@ class SealedTier:
             if left_over.is_here(name):
                 self._remove([name])
             else:
-                _log.warning("%s: nobody names this file; it is kept as %s.unnamed", self._folder / name, Path(name).name)
+                said = "%s: not in the catalogue of the store; it is kept as %s.unnamed"
+                _log.warning(said, self._folder / name, Path(name).name)
                 (self._folder / name).replace(self._folder / (name + ".unnamed"))
         for name, (identity, size) in named.items():
             if there.get(name) == size:

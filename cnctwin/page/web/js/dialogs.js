@@ -161,7 +161,7 @@ async function openDeeds() {
       ...(trouble ? [el("p", { class: "trouble" }, trouble)] : []),
       rows.length
         ? table(["When", "Who", "From", "What", "Outcome"], rows, { label: "Who did what", className: "deeds" })
-        : el("p", { class: "quiet" }, "Nobody has done anything yet."),
+        : el("p", { class: "quiet" }, "No actions yet."),
       el("p", { class: "note" }, file ? `Older lines: ${file}` : "Kept in memory only, until the server ends."),
     );
   } catch (error) {

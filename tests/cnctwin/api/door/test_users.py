@@ -55,6 +55,6 @@ def test_users_open_an_address_to_the_network_and_users_without_a_token_do_not(t
     path = file_of(tmp_path, GOOD)
     assert access_of(ServeOptions(host="0.0.0.0", users=path), None).has_tokens
     path.write_text('[ada]\nrole = "operator"\n')
-    with pytest.raises(UsageError, match="nobody has a token"):
+    with pytest.raises(UsageError, match="none of these users has a token"):
         access_of(ServeOptions(users=path), None)
     assert access_of(ServeOptions(users=path, proxy_header="X-User", proxy="10.0.0.5"), None).users

@@ -201,7 +201,7 @@ TOLD: list[tuple[str, Facts, tuple[str, str], tuple[str, str]]] = [
     (
         SOURCE_LOST,
         {},
-        ("Nobody watches the machine for 9 s: a processor has stopped", ""),
+        ("Machine not monitored for 9 s: a processor has stopped", ""),
         ("Niemand überwacht die Maschine seit 9 s: Ein Prozessor ist stehen geblieben", ""),
     ),
     (

@@ -134,7 +134,11 @@ REFUSED = {
     "nonsense": ("§17 ?nonsense?", "§17 ?nonsense?", "is not read"),
     "a preset that is not there": ("CYCL DEF 247 Q339=+9", "Q339", "no line 9"),
     "a datum that is not there": ("CYCL DEF 7.1 #9", "#9", "no such line"),
-    "a tool that nobody named": ('TOOL CALL "X" Z', '"X" Z', "tool_numbers"),
+    "letters among the figures of a feed": ("L X+5 R0 F3OO M3", "F3OO", "is not read"),
+    "a letter in a coordinate": ("L X+1O Z-5", "X+1O", "is not read"),
+    "an end that is not on the circle": ("CC X+10 Y+0\nC X+30 Y+2 DR+ F100", "", "correct CC or the end"),
+    "a circle about its start": ("L X+0 Y+0 F100\nCC X+0 Y+0\nC X+30 Y+2 DR+", "", "correct CC or the start"),
+    "a tool that nobody named": ('TOOL CALL "X" Z', '"X"', "tool_numbers"),
     "a rotation without an angle": ("CYCL DEF 10.1 TURN", "TURN", "ROT+30"),
     "a corner at the end": ("L X+5 F100\nRND R2", "RND R2", "program ends"),
 }

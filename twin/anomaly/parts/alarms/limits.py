@@ -20,7 +20,7 @@ MARGIN = 1.6
 HALF_LIFE_S = 60 * 86_400.0
 TOLERATED_MAX = 100
 LASTING = SCALES[1:]
-"""What lasts for a cut comes to the longer scales too, later than a person speaks: their limits rise alike."""
+"""Scales whose limits rise together: an alarm that lasts for a cut reaches the longer ones too, after a person has judged it."""
 
 
 class Tolerated(NamedTuple):

@@ -23,7 +23,7 @@ OPTIONAL: Final[Mapping[int, float]] = {
     **{256: 0.2, 257: 0.0, 258: 0.2, 259: 0.2, 301: 1.0, 336: 0.0, 338: 0.0, 342: 0.0, 343: 0.0, 351: 1.0, 365: 0.0, 366: 0.0},
     **{367: 0.0, 368: 0.0, 369: 0.0, 370: 1.0, 374: 0.0, 377: 1.0, 378: 0.0, 379: 0.0, 395: 0.0, 403: 1.0, 439: 0.0},
 }
-"""What a parameter that an older definition does not have stands for: the cycle as it was before it had it."""
+"""Values of parameters that an older definition does not have: the cycle as it was before it had them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from twin.programs.klartext.state import State
 from twin.programs.refusal import RefusedError
 
 Cycle = Callable[[State, Definition], None]
-"""What a cycle does where the tool is."""
+"""The motions of a cycle at the place where the tool is."""
 
 MACHINING: Final[Mapping[int, Cycle]] = {
     200: drilling.drilling,

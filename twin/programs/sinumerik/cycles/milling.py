@@ -20,9 +20,9 @@ from twin.programs.sinumerik.state import State
 
 SMALL_MM: Final = 1e-9
 WIDTH_SHARE: Final = 0.8
-"""Of the tool's diameter: the width of a cut where _MIDA is 0."""
+"""Part of the tool's diameter that is the width of a cut where _MIDA is 0."""
 CORNER_SHARE: Final = 1.7
-"""Of the tool's radius, just under 1 + 1/√2: the widest step between rings with corners that leaves no island there."""
+"""Widest step between rings with corners that leaves no island there, in radii of the tool: just under 1 + 1/√2."""
 
 
 class Segment(NamedTuple):

@@ -87,7 +87,7 @@ export function open(app) {
       "p",
       {},
       el("strong", {}, alert.labels?.machine ?? ""),
-      `: ${sentence(alert)}. It is not repeated and goes to nobody else. An alert that becomes more severe fires again.`,
+      `: ${sentence(alert)}. It is neither repeated nor escalated. An alert that becomes more severe fires again.`,
     );
     openSigned("Acknowledge", about, "Acknowledge", async (by, comment) => {
       const outcome = await post(`alerts/${part(alert.fingerprint)}/acknowledge`, { by, comment, episode: alert.episode });
@@ -101,7 +101,7 @@ export function open(app) {
     const { machine = "", alertname = "" } = alert.labels ?? {};
     const hours = el("input", { class: "field", name: "hours", type: "number", min: "0.1", max: "720", step: "any", value: "2" });
     const about = [
-      el("p", {}, el("strong", {}, machine), `: nobody is notified of ${words(alertname)} for a while. It stays on this page.`),
+      el("p", {}, el("strong", {}, machine), `: no notifications of ${words(alertname)} for a while. It stays on this page.`),
       el("label", { class: "named" }, "For how many hours", hours),
     ];
     openSigned("Silence", about, "Silence", async (by, comment) => {
@@ -296,8 +296,8 @@ export function open(app) {
           ? el(
               "div",
               { class: "empty" },
-              el("h2", {}, "Nobody watches for alerts"),
-              el("p", {}, "The processor that turns alarms into alerts is not heard. Start it:"),
+              el("h2", {}, "No alerts are raised"),
+              el("p", {}, "The processor that turns alarms into alerts is not running. Start it:"),
               el("pre", {}, "cnctwin process rules joint_anomaly alerts --config processors.toml"),
             )
           : block("Firing", cards(firing), "Nothing fires."),

@@ -6,7 +6,7 @@ import { number, recorded, sentence, share, words } from "../text.js";
 import { shade } from "./gap_shade.js";
 
 const CALLED = lookup({
-  healthy: "as told",
+  healthy: "healthy",
   explained: "explained",
   partly_explained: "partly explained",
   unknown: "not understood",

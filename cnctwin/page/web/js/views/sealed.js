@@ -17,7 +17,7 @@ export function sealedBox(sealed, changed) {
       "div",
       { class: "sealed" },
       el("h3", {}, "Something is hidden in this machine"),
-      el("p", {}, "It was given an effect that its twin was not told of. Nobody knows which one: it is sealed as ", hash, "."),
+      el("p", {}, "It was given an effect that its twin does not know. Which one stays secret until you reveal it: it is sealed as ", hash, "."),
       el("button", { type: "button", class: "button", "data-deed": "reveal", onclick: () => ask(changed) }, "Reveal"),
     );
   const checked = el("p", { class: "note" }, "The hash is being computed again …");
