@@ -7,6 +7,7 @@ from typing import Any
 
 from cnctwin.plant.described import DescribedMachine, described_machines, sentences
 from cnctwin.plant.descriptions import LiveDescriptions
+from cnctwin.plant.gone import FILTERS, LastWords
 from cnctwin.plant.lags import lag_reports
 from cnctwin.plant.on_log import FirstLook, of_log
 from cnctwin.plant.quarantine import refused_lines
@@ -59,9 +60,10 @@ class Report:
 
 def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
     """Listen to a broker for a while and report; asks nodes for their births where it has to."""
-    host, descriptions, first = viewer(broker, group), LiveDescriptions(), FirstLook()
-    for topic in descriptions.filters:
+    host, descriptions, first, last = viewer(broker, group), LiveDescriptions(), FirstLook(), LastWords()
+    for topic in (*descriptions.filters, *FILTERS):
         host.subscribe_plain(topic)
+    host.on_state = last.take_state
     host.start()
     try:
         deadline_s = time.monotonic() + seconds
@@ -69,8 +71,9 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
             for event in host.poll(0.1):
                 if event.kind is EventKind.PLAIN:
                     descriptions.take(event.topic, event.payload)
+                    last.take(event.topic, event.payload)
             first.take(host)
-        return diagnose(host, broker.url, descriptions, first)
+        return diagnose(host, broker.url, descriptions, first, last)
     finally:
         host.stop()
 
@@ -87,8 +90,11 @@ def counted_signals(measured: Mapping[str, Reading]) -> str:
     return f"{len(measured)} signals, {len(bad)} not good{named}"
 
 
-def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook) -> Report:
-    """Return what a host application that has listened for a while can say; `first`: how nodes were when it began."""
+def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook, last: LastWords) -> Report:
+    """Return what a host application that has listened for a while can say.
+
+    first: how nodes were when it began; last: what processors have left behind
+    """
     if not host.online:
         return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
     findings = [Finding(True, f"{url} answers")]
@@ -102,6 +108,7 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
             findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
     if not host.nodes():
         findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
+    findings += [Finding(False, sentence) for sentence in last.gone(host)]
     for machine in machines(host):
         state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
         findings.append(Finding(machine.online, f"{machine.name}: {state}; {counted_signals(machine.measured)}"))

@@ -1,6 +1,8 @@
 """`cnctwin alerts` against a real broker, the real processor and a courier with a receiver on loopback."""
 
 import json
+import re
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -10,6 +12,7 @@ import pytest
 
 from cnctwin.commands.see.alerts import alerts_app, duration_s
 from cnctwin.errors import UsageError
+from cnctwin.plant.doctor import examine
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.thread import Courier
 from processors.config import read_tables
@@ -18,6 +21,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.cnctwin.program import Program, until
 from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
 from tests.until_stopped import until_stopped
@@ -150,6 +154,28 @@ def test_without_the_processor_it_says_so(cnctwin: Cnctwin, broker: BrokerAddres
     code, _, err = cnctwin("list", "--wait", "1")
     assert code == 2
     assert "does the processor run? (cnctwin process alerts)" in err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_processor_that_is_gone_is_no_quiet_plant(
+    cnctwin: Cnctwin, broker: BrokerAddress, tmp_path: Path, number: signal.Signals
+) -> None:
+    options = ("--broker", broker.url, "--state-dir", str(tmp_path / "state"))
+    with Program(tmp_path, "process", "rules", "alerts", *options) as program:
+        until(lambda: cnctwin("list", "--wait", "1")[0] == 0, "the processor")
+        program.process.send_signal(number)
+        program.process.wait()
+    code, out, err = cnctwin("list", "--wait", "1")
+    assert (code, out) == (2, "")
+    assert re.fullmatch(
+        r"cnctwin: nothing heard from the processor alerts since 20[\d :-]+ UTC; is `cnctwin process alerts` running\?\n", err
+    )
+    bad = [finding.text for finding in examine(broker, "cnc", 1.5).findings if not finding.good]
+    assert [text.partition(" since 20")[0] for text in bad] == [
+        "no edge node was heard of; start one with `cnctwin edge run CONFIG`",
+        "nothing heard from the processor alerts",
+    ]
+    assert bad[1].endswith("clear what it left on the broker: spBv1.0/STATE/twin-alerts, cnctwin/alerts/state")
 
 
 def test_without_a_broker_it_says_so(mosquitto: Mosquitto, cnctwin: Cnctwin) -> None:
