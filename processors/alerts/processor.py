@@ -12,7 +12,7 @@ from processors.alarms import alarm_signals
 from processors.alerts import lag
 from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
-from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX, TOPIC, taken
+from processors.alerts.messages import CLAIM, COMMAND, DELIVERY, OUTBOX, TOPIC, taken
 from processors.alerts.notices import notified
 from processors.alerts.outbox import emitted, made
 from processors.alerts.report import FIRING, STATE, SUMMARY, machine_outputs, state_output
@@ -108,6 +108,6 @@ PROCESSOR = CellProcessor(
     initial=lambda _: AlertsState(),
     step=step,
     reads=read_wordings,
-    listens=(f"{COMMAND}#", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
+    listens=(f"{COMMAND}#", f"{CLAIM}+", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
     beats=True,
 )

@@ -110,13 +110,14 @@ def try_receiver(
     with alert_desk(address(broker), wait_s) as desk:
         before = _counts(desk.state, receiver)
         key = desk.command("test", wait_s, by=by, receiver=receiver)
-        desk.until(lambda: _counts(desk.state, receiver) != before, max(wait_s, TEST_S_MAX))
+        desk.until(lambda: _counts(desk.state, receiver) != before or _not_taken(desk.state, receiver), max(wait_s, TEST_S_MAX))
         failure = next((one for one in desk.state.get("failures", ()) if one.get("id") == key), None)
         if failure is not None:
             print(f"{receiver}: failed: {failure['reason']}", file=sys.stderr)
             raise typer.Exit(1)
         if _counts(desk.state, receiver) == before:
-            print(f"{receiver}: nothing is known of it yet; is the courier running? `list` shows what waits", file=sys.stderr)
+            waits = f"no outcome within {max(wait_s, TEST_S_MAX):g} s; `cnctwin alerts list` shows what waits"
+            print(f"{receiver}: {_not_taken(desk.state, receiver) or waits}", file=sys.stderr)
             raise typer.Exit(1)
         print(f"{receiver}: delivered")
 
@@ -147,6 +148,12 @@ def _one(state: Mapping[str, Any], start: str) -> Mapping[str, Any]:
 def _counts(state: Mapping[str, Any], receiver: str) -> tuple[int, int]:
     known = state.get("receivers", {}).get(receiver, {})
     return int(known.get("delivered", 0)), int(known.get("failed", 0))
+
+
+def _not_taken(state: Mapping[str, Any], receiver: str) -> str:
+    """Return what is the matter with a notification that is tried again; "" where none is."""
+    known = state.get("receivers", {}).get(receiver, {})
+    return str(known["last_error"]) if known.get("not_taken") else ""
 
 
 def _show(state: Mapping[str, Any]) -> None:

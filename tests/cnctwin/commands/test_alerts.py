@@ -156,6 +156,15 @@ def test_without_the_processor_it_says_so(cnctwin: Cnctwin, broker: BrokerAddres
     assert "does the processor run? (cnctwin process alerts)" in err
 
 
+def test_a_receiver_that_is_down_is_named_and_tried_again(cnctwin: Cnctwin, edge: EdgeNode, server: ReceivingServer) -> None:
+    server.__exit__()
+    code, out, err = cnctwin("test", "desk")
+    said = f"not taken yet (127.0.0.1:{server.port}: connection refused); it will be tried again"
+    assert (code, out, err) == (1, "", f"desk: {said}\n")
+    (desk,) = json.loads(cnctwin("list", "--json")[1])["receivers"].values()
+    assert (desk["waiting"], desk["failed"], desk["last_error"]) == (1, 0, said)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_processor_that_is_gone_is_no_quiet_plant(
     cnctwin: Cnctwin, broker: BrokerAddress, tmp_path: Path, number: signal.Signals
