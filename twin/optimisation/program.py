@@ -144,9 +144,7 @@ def programmed(
     moves, words = dialect.interpret(text, machine.settings), dialect.words
     path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
-        raise MachineError(
-            "no [stock]: what a line cuts is not known; give the block with --stock, or a run log with --engagement"
-        )
+        raise MachineError("no [stock]: what a line cuts is not known; give --stock, or a run log with --engagement")
     numbers, tools = tools_used(machine, path)
     notes = [*remarks(dialect, text, moves), *tool_notes(machine, path)]
     rows: PathRows | None = None
