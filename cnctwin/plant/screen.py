@@ -4,11 +4,13 @@ Whatever comes from the broker is shown as it is: a bracket in a name is a brack
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.markup import escape
 from rich.panel import Panel
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -44,6 +46,27 @@ def screen(machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note
         parts.append(_ledgers(ledgers))
     parts.append(Text(note, style="dim"))
     return Group(*parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Cropped:
+    """A view cut to the height of the terminal; its last line then says how to see the rest."""
+
+    whole: RenderableType
+    note: str
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield what there is room for."""
+        lines = console.render_lines(self.whole, options, pad=False)
+        room = console.height - 1
+        if len(lines) <= room:
+            yield self.whole
+            return
+        for shown in lines[: room - 1]:
+            yield from shown
+            yield Segment.line()
+        rest = f"{len(lines) - room} more lines: enlarge the window, or name one machine (cnctwin watch MACHINE) · {self.note}"
+        yield Text(rest, style="dim", no_wrap=True, overflow="ellipsis")
 
 
 def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str:
@@ -88,7 +111,7 @@ def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
 
 def _machine(machine: MachineView) -> Panel:
     table = Table(show_edge=False, expand=True)
-    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin", 4), ("", 4)):
+    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin, rules, alerts", 4), ("", 4)):
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
     order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
     twin = sorted(machine.twin.values(), key=lambda reading: reading.value is None)  # what is known stands first

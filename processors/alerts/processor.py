@@ -1,8 +1,9 @@
 """Alerts: from alarm signals of all machines to notifications, once each, for people who are to keep them switched on.
 
-A pure fold over all machines. Once a second (a beat of the wall clock) each alarm is looked at, each alert goes a step
-(`phases.py`), and what each receiver has to be told (`notices.py`) goes into the outbox (`outbox.py`), a retained message for
-each notification, which the courier (`courier/`) sends. What became of it comes back; only then is it cleared.
+Its state follows from the messages of all machines alone. Once a second (a beat of the wall clock) each alarm is looked at, each
+alert goes a step (`phases.py`), and what each receiver has to be told (`notices.py`) goes into the outbox (`outbox.py`), a
+retained message for each notification, which the courier (`courier/`) sends. What became of it comes back; only then is it
+cleared.
 """
 
 from collections.abc import Sequence

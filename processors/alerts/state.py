@@ -223,7 +223,7 @@ class AlertsState:
 
 
 def fingerprint(labels: dict[str, str]) -> str:
-    """Return the identity of an alert: its labels, severity left out, since that may rise.
+    """Return the identity of an alert: its labels without the severity, which may rise.
 
     >>> fingerprint({"alertname": "rule_vibration", "machine": "okuma"})
     'ea33a6c7165f5dfa'

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
-from rich.text import Text
 
 from cnctwin.commands.options import AsJson, Broker
 from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.table import left_out, text_table
 
 if TYPE_CHECKING:
     from edge.adapter import Row
 
+COLUMNS = ("signal", "from", "unit", "native unit", "value now", "why not")
 edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
 
 
@@ -46,7 +47,11 @@ def check(config: Annotated[Path, typer.Argument(help="The TOML file of one mach
     if as_json:
         sys.stdout.write(json.dumps([asdict(row) for row in rows], default=str) + "\n")
     else:
-        standard_output().print(_table(rows))
+        console = standard_output()
+        table = _table(rows, console.width)
+        console.print(table)
+        if missing := left_out(table, COLUMNS):
+            console.print(f"no room for: {', '.join(missing)}; a wider terminal or --json shows it", style="dim", soft_wrap=True)
 
 
 @edge_app.command()
@@ -62,15 +67,14 @@ def discover(
     sys.stdout.write(draft(url, device=device))
 
 
-def _table(rows: "Sequence[Row]") -> Table:
+def _table(rows: "Sequence[Row]", width: int) -> Table:
     """Return the signals that an edge would publish, for a person to read."""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
-    added = "the edge adds tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
-    shown = Table(title=f"{signals} signals would be published; {added}", title_justify="left")
-    for column in ("signal", "from", "unit", "native unit", "value now", "why not"):
-        shown.add_column(column, overflow="fold")
-    for row in rows:
-        value = "–" if row.value is None else str(row.value)
-        cells = (row.signal, row.source, row.unit or "", row.native_unit or "", value, row.reason or "")
-        shown.add_row(*(Text(cell) for cell in cells))  # as text: a bracket in a block of the program is no markup
-    return shown
+    added = "the edge adds its own: tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
+    values = ("–" if row.value is None else str(row.value) for row in rows)
+    cells = [
+        (row.signal, row.source, row.unit or "", row.native_unit or "", value, row.reason or "")
+        for row, value in zip(rows, values, strict=True)
+    ]
+    title = f"{signals} signals would be published; {added}"
+    return text_table(COLUMNS, cells, width, ("native unit", "unit", "from"), title=title, show_edge=True)

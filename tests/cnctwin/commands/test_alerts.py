@@ -120,7 +120,8 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
     silence = out.split()[1]
     assert f"silence {silence}: machine okuma, until " in cnctwin("list")[1]
     assert " UTC, by ada: [new] tool" in cnctwin("list")[1]
-    assert cnctwin("unsilence", silence, "--by", "ada") == (0, f"silence {silence} has ended\n", "")
+    assert f"there are: {silence}: machine okuma, until " in cnctwin("unsilence", "x", "--by", "ada")[2]
+    assert cnctwin("unsilence", silence[:4], "--by", "ada") == (0, f"silence {silence} has ended\n", "")
     assert cnctwin("test", "desk") == (0, "desk: delivered\n", "")
     assert server.received[-1].json["groupKey"] == "test"
     assert [one["annotations"]["test"] for one in server.received[-1].json["alerts"]] == ["true"]
@@ -138,10 +139,11 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
 
 def test_wrong_input_is_one_line_and_exit_code_2(cnctwin: Cnctwin, edge: EdgeNode) -> None:
     for arguments, said in (
-        (("ack", "0123", "--by", "ada"), "no alerts fire whose fingerprint begins with '0123'; there are: none"),
+        (("ack", "0123", "--by", "ada"), "no alerts fire whose number begins with '0123'; there are: none"),
         (("silence", "--for", "2h", "--by", "ada"), "a silence needs --machine, --alert or --severity"),
         (("silence", "--machine", "m", "--for", "soon", "--by", "ada"), "'soon' is no duration"),
-        (("unsilence", "nothing", "--by", "ada"), "there is no silence nothing"),
+        (("silence", "--machine", "m", "--for", "2", "--by", "ada"), "--for '2' has no unit; write 2h for hours, 2m for minutes"),
+        (("unsilence", "7", "--by", "ada"), "no silences have a number that begins with '7'; there are: none"),
         (("test", "nobody"), "there is no receiver 'nobody'; there are: desk"),
     ):
         code, out, err = cnctwin(*arguments)
