@@ -85,7 +85,8 @@ def in_sums(ledger: StageLedger) -> str:
     """
     unchanged = ledger.reasons.get(Drop.UNCHANGED, 0)
     repeats = f" + {unchanged} unchanged" if unchanged else ""
-    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {ledger.dropped - unchanged} dropped + {ledger.buffered} buffered"
+    dropped = ledger.dropped - unchanged
+    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {dropped} dropped + {ledger.buffered} buffered"
 
 
 def counted_signals(measured: Mapping[str, Reading]) -> str:

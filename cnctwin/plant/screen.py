@@ -162,7 +162,7 @@ def _machine(machine: MachineView, rows_max: int | None) -> Panel:
 
 
 def _ordered(readings: Mapping[str, Reading], first: Sequence[str]) -> list[Reading]:
-    """Return readings as a person looks for them: the most telling in their places, then the known, then those that explain; no JSON."""
+    """Return readings as a person looks for them: the most telling first, then the known, then those that explain; no JSON."""
     rank = {name: place for place, name in enumerate(first)}
 
     def place(reading: Reading) -> tuple[int, bool, bool, str]:
