@@ -144,9 +144,7 @@ def programmed(
     moves, words = dialect.interpret(text, machine.settings), dialect.words
     path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
-        raise MachineError(
-            "no [stock]: what a line cuts is not known; give the block with --stock, or a run log with --engagement"
-        )
+        raise MachineError("no [stock]: what a line cuts is not known; give --stock, or a run log with --engagement")
     numbers, tools = tools_used(machine, path)
     sections = tool_sections(numbers, tools, unknown_start(path))
     rows = None if engagement is not None or machine.stock is None else engaged_along(path, machine.stock, sections)

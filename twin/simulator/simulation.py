@@ -23,6 +23,7 @@ from twin.motion.sampling import sampled
 from twin.programs import FeedForward, Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
+from twin.programs.fanuc.lathe import lathe_remarks
 from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
@@ -87,7 +88,7 @@ def simulate(
     settings = program_settings(machine) if settings is None else settings
     dialect = dialect_of(text, settings)
     own = dialect.interpret(text, settings)
-    notes: list[str] = []
+    notes: list[str] = [*lathe_remarks(machine.axes)]
     moves = with_line_elsewhere(own, len(source_lines(text)))
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]

@@ -13,6 +13,10 @@ from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
 
+STYLES = {"good": "green", "note": "cyan", "bad": "bold red"}
+UNMAPPED = "unmapped"
+"""The reason for which an edge drops what its configuration has no signal for."""
+
 
 def doctor(
     broker: Broker = None,
@@ -26,7 +30,7 @@ def doctor(
         list[Path] | None,
         typer.Option(
             help="Configuration or log for the bundle, a file or a folder; may be given again; else processors.toml, edges, "
-            "machines and logs of this folder",
+            "machines, logs and state/logs of this folder",
             show_default=False,
         ),
     ] = None,
@@ -46,14 +50,15 @@ def doctor(
     else:
         console = standard_output()
         for finding in report.findings:
-            mark = "[green]good[/]" if finding.good else "[bold red]bad [/]"
-            console.print(mark, end=" ")
+            console.print(f"{finding.mark:<4}", style=STYLES[finding.mark], end=" ")
             console.print(finding.text, markup=False, highlight=False, soft_wrap=True)
         if report.ledgers:
             console.print(ledger_table(report.ledgers))
+            if any(UNMAPPED in ledger.reasons for ledger in report.ledgers):
+                console.print(f"{UNMAPPED}: values that the control offers and the edge's configuration gives no signal")
     if bundle is not None:
-        from cnctwin.plant.bundle import write_bundle
+        from cnctwin.plant.bundle import summary, write_bundle
 
         names = write_bundle(bundle, report.as_json(), include or ())
-        print(f"{bundle}: {len(names)} files, secrets taken out; look through it before you send it", file=sys.stderr)
+        print(summary(bundle, names), file=sys.stderr)
     raise typer.Exit(0 if report.good else 1)

@@ -46,7 +46,8 @@ def heard(**of: bytes) -> LiveDescriptions:
 
 
 def said(descriptions: LiveDescriptions, *machines: str) -> list[tuple[bool, str]]:
-    return [one for machine in described_machines(descriptions, machines) for one in sentences(machine)]
+    found = [one for machine in described_machines(descriptions, machines) for one in sentences(machine)]
+    return [(one.good, one.text) for one in found]
 
 
 def test_a_machine_whose_constants_are_known_has_one_line() -> None:
@@ -70,7 +71,7 @@ def test_a_section_that_live_figures_rest_on_is_assumed_where_the_file_lacks_it(
     text = '[machine]\nname = "vmc"\n' + TOML[TOML.index("[thermal]") :]
     (machine,) = described_machines(heard(live=message(text)), [])
     assert machine.assumed == ("spindle",)
-    assert "vmc: spindle is assumed; " in [*sentences(machine)][1][1]
+    assert "vmc: spindle is assumed; " in [*sentences(machine)][1].text
 
 
 def test_a_connected_machine_that_nobody_has_described_is_named_with_the_way_out() -> None:
@@ -80,6 +81,11 @@ def test_a_connected_machine_that_nobody_has_described_is_named_with_the_way_out
         "okuma: not described, so its constants are assumed; write machines/okuma.toml, "
         "or `cnctwin identify --store STORE --machine okuma --out okuma.toml` fits one",
     )
+
+
+def test_a_command_for_a_name_with_a_space_can_be_typed() -> None:
+    ((_, line),) = said(LiveDescriptions(), "Fräse 1")
+    assert "--machine 'Fräse 1' --out 'Fräse 1.toml'" in line
 
 
 def test_a_challenger_that_waits_is_told_with_the_commands_that_weigh_and_promote_it() -> None:
@@ -155,4 +161,4 @@ def test_the_command_reads_descriptions_from_the_broker(
         "challenger_why": "",
         "faults": ["machines/vmc.toml: wrong"],
     }
-    assert {"good": False, "text": "vmc: machines/vmc.toml: wrong"} in report["findings"]
+    assert {"good": False, "text": "vmc: machines/vmc.toml: wrong", "note": False} in report["findings"]
