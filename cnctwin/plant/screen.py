@@ -35,11 +35,14 @@ FIRST = (
 )
 _STYLE = {Quality.GOOD: "", Quality.STALE: "dim", Quality.BAD: "red"}
 _VALUE_WIDTH_MAX = 60
+TIME = "time (UTC)"
+WIDE = 100
+"""Columns of a terminal from which there is room for the time of each value, beside whole names."""
 
 
-def screen(machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str) -> RenderableType:
-    """The whole view."""
-    parts: list[RenderableType] = [_machine(machine) for machine in machines]
+def screen(machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str, width: int = WIDE) -> RenderableType:
+    """The whole view, for a terminal of this width."""
+    parts: list[RenderableType] = [_machine(machine, has_times=width >= WIDE) for machine in machines]
     if not machines:
         parts.append(Panel("waiting for a machine to be born", title="no machine yet"))
     if ledgers:
@@ -65,7 +68,7 @@ class Cropped:
         for shown in lines[: room - 1]:
             yield from shown
             yield Segment.line()
-        rest = f"{len(lines) - room} more lines: enlarge the window, or name one machine (cnctwin watch MACHINE) · {self.note}"
+        rest = f"{len(lines) - room + 1} more lines: enlarge the window, or name one machine · {self.note}"
         yield Text(rest, style="dim", no_wrap=True, overflow="ellipsis")
 
 
@@ -109,9 +112,11 @@ def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
     return table
 
 
-def _machine(machine: MachineView) -> Panel:
+def _machine(machine: MachineView, *, has_times: bool) -> Panel:
     table = Table(show_edge=False, expand=True)
-    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin, rules, alerts", 4), ("", 4)):
+    columns = (("measured", 3), ("", 4), (TIME, 2), ("twin and rules", 4), ("", 4))
+    narrow = (("measured", 5), ("", 4), ("twin and rules", 5), ("", 4))
+    for title, ratio in columns if has_times else narrow:
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
     order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
     twin = sorted(machine.twin.values(), key=lambda reading: reading.value is None)  # what is known stands first
@@ -121,7 +126,7 @@ def _machine(machine: MachineView) -> Panel:
         table.add_row(
             Text(order[row] if reading else ""),
             _cell(reading),
-            _clock(reading),
+            *((_clock(reading),) if has_times else ()),
             Text(beside.name.removeprefix(twin_signals.TWIN_PREFIX) if beside else ""),
             _cell(beside),
         )
