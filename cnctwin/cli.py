@@ -17,6 +17,7 @@ from typer.main import get_group
 
 from cnctwin.commands import connect, keep, learn, run, see, twin
 from cnctwin.commands.group import CommandGroup
+from cnctwin.commands.without_argument import explained
 from cnctwin.errors import ApplicationError, BrokerStartError
 from cnctwin.files.modes import restrict
 from edge.errors import EdgeError
@@ -118,7 +119,9 @@ def _explain(error: TyperException) -> NoReturn:
     message = error.format_message()
     if not message:  # A command without arguments: its help has been shown already.
         raise SystemExit(2)
-    context = getattr(error, "ctx", None)
+    context, option = getattr(error, "ctx", None), getattr(error, "option_name", None)
+    if context is None and option and (told := explained(get_group(app), sys.argv[1:], option)):
+        _fail(told, 2)
     joint = " See" if message.endswith("?") else "; see"
     _fail(f"{message.rstrip('.')}{joint} {'cnctwin' if context is None else context.command_path} --help", 2)
 

@@ -1,5 +1,6 @@
 """A configuration file, read and checked."""
 
+import shlex
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,7 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
 def _check_adapter_is_stated(tables: dict[str, Any], path: Path) -> None:
     """Refuse a file that holds nothing, and one with the table of a control that [machine] does not name."""
     if not tables:
-        raise ConfigError(f"{path}: is empty; cnctwin edge discover ADDRESS > {path.name} drafts it")
+        raise ConfigError(f"{path}: is empty; cnctwin edge discover ADDRESS > {shlex.quote(path.name)} drafts it")
     machine = tables.get("machine", {})
     default = MachineSection().adapter
     named = next((name for name in tables if name in modules() and name != default), None)

@@ -1,5 +1,6 @@
 """Residual models: what the physics gets wrong, learned; used only inside the region that a model was trained on."""
 
+import shlex
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -82,7 +83,7 @@ def models_part(models: Models) -> Part:
     found, trouble = models.current()
     if trouble or not found:
         line = f"{trouble or f'{folder} holds no model'}: predictions are the physics alone"
-        return Part(part="models", state="missing", reason=line, do=f"cnctwin train residual --out {folder}")
+        return Part(part="models", state="missing", reason=line, do=f"cnctwin train residual --out {shlex.quote(str(folder))}")
     return Part(part="models", state="ok", reason="; ".join(f"{name}: {model.version}" for name, model in found.items()))
 
 

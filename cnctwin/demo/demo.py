@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
+from urllib.parse import quote
 
 from rich.console import Console
 
@@ -98,7 +99,7 @@ def run(options: DemoOptions, stop: Event) -> int:
             loop.see(events)
 
         if demo.page_url and not options.no_open:
-            open_browser(demo.page_url)
+            open_browser(view_url(demo))
         console.print(greeting(demo), markup=False, highlight=False, soft_wrap=True)
         started_s = time.monotonic()
         ends_s = None if options.seconds is None else started_s + options.seconds
@@ -111,7 +112,7 @@ def run(options: DemoOptions, stop: Event) -> int:
                 told.add(demo.page_url)
                 console.print(page_line(demo), markup=False, highlight=False, soft_wrap=True)
                 if not options.no_open:
-                    open_browser(demo.page_url)
+                    open_browser(view_url(demo))
             if not console.is_terminal and (notice := demo.notice) not in told:
                 told.add(notice)
                 console.print(f"{demo.machine}: {notice}", markup=False, highlight=False, soft_wrap=True)
@@ -158,7 +159,13 @@ def greeting(demo: Demo) -> str:
 
 def page_line(demo: Demo) -> str:
     """Return the line that says where the page is, or why there is none."""
-    return f"page:      {demo.page_url or demo.page_trouble}"
+    return f"page:      {view_url(demo) if demo.page_url else demo.page_trouble}"
+
+
+def view_url(demo: Demo) -> str:
+    """Return the address of the view to begin with: that of the gap, where the loop is followed; a recording has no loop."""
+    view = "machine" if demo.options.recording else "gap"
+    return f"{demo.page_url}/#/{view}/{quote(demo.machine, safe='')}"
 
 
 def open_browser(url: str) -> None:
@@ -188,11 +195,11 @@ def _told(loop: LoopOutcome) -> str:
     hidden = f"hidden: {loop.effect}{f' on {loop.on}' if loop.on else ''}"
     if not loop.named:
         return f"{hidden}; the loop named nothing by then"
-    others = f", not told from {', '.join(loop.not_told_from)}" if loop.not_told_from else ""
+    others = f", not told apart from {', '.join(loop.not_told_from)}" if loop.not_told_from else ""
     if not loop.promoted or loop.gap_before is None or loop.gap_after is None:
         return f"{hidden}; named: {', '.join(loop.named)}{others}; {'promoted' if loop.promoted else 'not promoted'} by then"
     closed = f", closed after {loop.seconds:.0f} s" if loop.seconds is not None else ""
-    gap = f"{loop.gap_before:.1f} → {loop.gap_after:.1f} floors"
+    gap = f"{loop.gap_before:.1f} → {loop.gap_after:.1f} × the repeatability"
     return f"{hidden}; named: {', '.join(loop.named)}{others}; promoted, standing gap {gap}{closed}"
 
 

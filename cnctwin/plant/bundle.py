@@ -25,8 +25,10 @@ FILES_MAX = 200
 CONFIGURATION_BYTES_MAX = 1_000_000
 LOG_BYTES_MAX = 200_000
 LOGS = (".log", ".jsonl")
-DEFAULT = ("processors.toml", "edges", "machines", "logs")
-"""Files and folders that are taken of the current folder where none is named."""
+LOGS_FOLDER = "logs/"
+NO_LOGS = "none found; run this in the plant's folder, where `cnctwin up` keeps state/logs, or name them with --include"
+DEFAULT = ("processors.toml", "edges", "machines", "logs", "state/logs")
+"""Files and folders that are taken of the current folder where none is named; `cnctwin up` logs into the last one."""
 README = """A bundle of `cnctwin doctor --bundle`, for a report of a fault.
 
 Secrets are taken out: {blank} stands where one was. Names of machines, hosts and signals are still in it, and so may be
@@ -34,6 +36,7 @@ what a person typed into a name. Look through it before you send it.
 
 Taken out by key: {keys}
 Not read: {unread}
+Logs: {logs}
 """
 
 
@@ -54,11 +57,12 @@ def write_bundle(
     parts = {f"configuration/{name}.json": _json(blanks.texts(blanks.table(table))) for name, table in tables.items()}
     for file in _files(named):
         if file.suffix in LOGS:
-            parts[f"logs/{_name(file)}"] = blanks.text(_end_of(file))
+            parts[f"{LOGS_FOLDER}{_name(file)}"] = blanks.text(_end_of(file))
     parts["doctor.json"] = _json(blanks.texts(report))
     parts["versions.json"] = _json(versions(environment))
     keys = ", ".join(sorted(blanks.keys)) or "nothing"
-    parts["README.txt"] = README.format(blank=BLANK, keys=keys, unread=", ".join(unread) or "nothing")
+    logs = str(sum(name.startswith(LOGS_FOLDER) for name in parts) or NO_LOGS)
+    parts["README.txt"] = README.format(blank=BLANK, keys=keys, unread=", ".join(unread) or "nothing", logs=logs)
     try:
         with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as bundle:
             for name, text in sorted(parts.items()):
@@ -66,6 +70,18 @@ def write_bundle(
     except OSError as error:
         raise UsageError(f"--bundle {out}: {error.strerror or error}; name a file that can be written") from None
     return sorted(parts)
+
+
+def summary(out: Path, names: Sequence[str]) -> str:
+    """Return the line that is printed on a bundle: what is in it, and that there is no log where none was found.
+
+    >>> summary(Path("bug.zip"), ["README.txt", "logs/state/logs/edge.log"])
+    'bug.zip: 2 files, 1 of them a log, secrets taken out; look through it before you send it'
+    """
+    count = sum(name.startswith(LOGS_FOLDER) for name in names)
+    logs = f"{count} of them {'a log' if count == 1 else 'logs'}" if count else "no logs among them"
+    told = f"{out}: {len(names)} files, {logs}, secrets taken out; look through it before you send it"
+    return told if count else f"{told}\nlogs: {NO_LOGS}"
 
 
 def versions(environment: Mapping[str, str]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """The findings of `cnctwin doctor` on descriptions: which is live since when, what is assumed, what waits, what is wrong."""
 
+import shlex
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -73,7 +74,8 @@ def assumptions(machine: MachineFile) -> tuple[str, ...]:
 def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[Finding]:
     """Return a finding on each thing there is to say of a machine's description."""
     name = found.machine
-    fit = f"`cnctwin identify --store {store} --machine {name} --out {name}.toml` fits"
+    typed = shlex.quote(name)
+    fit = f"`cnctwin identify --store {shlex.quote(store)} --machine {typed} --out {shlex.quote(f'{name}.toml')}` fits"
     if found.assumed is None:
         text = f"{name}: not described, so its constants are assumed; write machines/{name}.toml, or {fit} one"
         yield Finding(True, text, note=True)
@@ -87,7 +89,7 @@ def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[Finding
     if found.challenger:
         why = f": {found.challenger_why}" if found.challenger_why else ""
         waits = f"challenger {found.challenger} waits{_since(found.challenger_since_ms)}{why}"
-        way = f"`cnctwin twin show {name}` weighs it, `cnctwin twin promote {name}` makes it live"
+        way = f"`cnctwin twin show {typed}` weighs it, `cnctwin twin promote {typed}` makes it live"
         yield Finding(True, f"{name}: {waits}; {way}", note=True)
     for fault in found.faults:
         yield Finding(False, f"{name}: {fault}")

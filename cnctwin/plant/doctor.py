@@ -15,6 +15,7 @@ from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
 from edge.running.awaited import LATE_S, NO_HISTORIAN
+from edge.sample import Drop
 from processors.lag_report import BEHIND_S, LagReport
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication
@@ -76,6 +77,18 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
         host.stop()
 
 
+def in_sums(ledger: StageLedger) -> str:
+    """Return what became of what a stage received; what only repeats a value is no loss and stands apart.
+
+    >>> in_sums(StageLedger("edge-vmc", True, 70, 5, 1, 64, {"unchanged": 60, "late": 4}))
+    '70 = 5 emitted + 60 unchanged + 4 dropped + 1 buffered'
+    """
+    unchanged = ledger.reasons.get(Drop.UNCHANGED, 0)
+    repeats = f" + {unchanged} unchanged" if unchanged else ""
+    dropped = ledger.dropped - unchanged
+    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {dropped} dropped + {ledger.buffered} buffered"
+
+
 def counted_signals(measured: Mapping[str, Reading]) -> str:
     """Return how many signals there are, how many are not good, and which: the first eight by name.
 
@@ -117,7 +130,7 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
     described = described_machines(descriptions, [machine.name for machine in machines(host)])
     findings += [said for one in described for said in sentences(one)]
     for ledger in stages:
-        sums = f"{ledger.received} = {ledger.emitted} emitted + {ledger.dropped} dropped + {ledger.buffered} buffered"
+        sums = in_sums(ledger)
         findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
     for node_id, metrics in health(host).items():
         connected, why = metrics.get("control_online"), metrics.get("last_error")

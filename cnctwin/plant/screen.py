@@ -3,7 +3,8 @@
 Whatever comes from the broker is shown as it is: a bracket in a name is a bracket, no markup.
 """
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -33,18 +34,44 @@ FIRST = (
     "spindle_temp_c",
     "ambient_temp_c",
 )
+_TWIN_FIRST = (
+    twin_signals.SPINDLE_TEMP_C,
+    twin_signals.SPINDLE_TEMP_RESIDUAL_K,
+    twin_signals.CUTTING_FORCE_N,
+    twin_signals.EXPECTED_CUTTING_FORCE_N,
+    twin_signals.SPINDLE_CUT_LOAD_PCT,
+    twin_signals.EXPECTED_SPINDLE_LOAD_PCT,
+    twin_signals.SPINDLE_LOAD_RESIDUAL_PCT,
+    f"{twin_signals.GAP_PREFIX}spindle_temp_c",
+    f"{twin_signals.GAP_PREFIX}spindle_load_pct",
+    twin_signals.TOOL_CHANGE_GATE,
+    twin_signals.ADJUSTED_SCORE,
+    twin_signals.ANOMALY_ALARM,
+    twin_signals.SEVERITY,
+    twin_signals.ALERT_STATE,
+)
 _STYLE = {Quality.GOOD: "", Quality.STALE: "dim", Quality.BAD: "red"}
 _VALUE_WIDTH_MAX = 60
 TIME = "time (UTC)"
 WIDE = 100
 """Columns of a terminal from which there is room for the time of each value, beside whole names."""
+_TEXT_LONG = 24
+"""A text of more characters explains something; values that change stand above it."""
+ROWS_MIN = 3
+_MACHINE_FRAME_ROWS, _LEDGER_FRAME_ROWS, _NOTE_ROWS = 4, 7, 3
 
 
-def screen(machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str, width: int = WIDE) -> RenderableType:
-    """The whole view, for a terminal of this width."""
-    parts: list[RenderableType] = [_machine(machine, has_times=width >= WIDE) for machine in machines]
+def screen(
+    machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str, height: int | None = None, width: int = WIDE
+) -> RenderableType:
+    """The whole view, for a terminal of this size; in its height the ledgers come before the last values of the machines."""
+    rows = None
+    if height is not None and machines:
+        taken = _NOTE_ROWS + (len(ledgers) + _LEDGER_FRAME_ROWS if ledgers else 0)
+        rows = max(ROWS_MIN, (height - taken) // len(machines) - _MACHINE_FRAME_ROWS)
+    parts: list[RenderableType] = [_machine(machine, rows, has_times=width >= WIDE) for machine in machines]
     if not machines:
-        parts.append(Panel("waiting for a machine to be born", title="no machine yet"))
+        parts.append(Panel("waiting for a machine: no edge has announced one yet", title="no machine yet"))
     if ledgers:
         parts.append(_ledgers(ledgers))
     parts.append(Text(note, style="dim"))
@@ -94,14 +121,14 @@ def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str
     return "; ".join(parts) + f" [{counted}]"
 
 
-def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
-    """The ledger of each stage: received = emitted + dropped + buffered."""
+def ledger_table(ledgers: Sequence[StageLedger], *, one_row: bool = False) -> Table:
+    """The ledger of each stage: received = emitted + dropped + buffered. one_row: of a stage, whatever its reasons need"""
     table = Table(title="received = emitted + dropped + buffered", title_justify="left", expand=False)
     table.add_column("stage", no_wrap=True)
     for name in ("received", "emitted", "dropped", "buffered"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("balances", no_wrap=True)
-    table.add_column("dropped because")
+    table.add_column("dropped because", no_wrap=one_row, overflow="ellipsis" if one_row else "fold")
     for ledger in ledgers:
         table.add_row(
             Text(ledger.node + ("" if ledger.online else " (offline)")),
@@ -112,26 +139,59 @@ def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
     return table
 
 
-def _machine(machine: MachineView, *, has_times: bool) -> Panel:
+def _machine(machine: MachineView, rows_max: int | None, *, has_times: bool) -> Panel:
     table = Table(show_edge=False, expand=True)
     columns = (("measured", 3), ("", 4), (TIME, 2), ("twin and rules", 4), ("", 4))
     narrow = (("measured", 5), ("", 4), ("twin and rules", 5), ("", 4))
     for title, ratio in columns if has_times else narrow:
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
-    order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
-    twin = sorted(machine.twin.values(), key=lambda reading: reading.value is None)  # what is known stands first
-    for row in range(max(len(order), len(twin))):
-        reading = machine.measured[order[row]] if row < len(order) else None
+    measured, twin = _ordered(machine.measured, FIRST), _ordered(machine.twin, _TWIN_FIRST)
+    rows = max(len(measured), len(twin))
+    shown = rows if rows_max is None else min(rows, rows_max)
+    for row in range(shown):
+        reading = measured[row] if row < len(measured) else None
         beside = twin[row] if row < len(twin) else None
         table.add_row(
-            Text(order[row] if reading else ""),
+            Text(reading.name if reading else ""),
             _cell(reading),
             *((_clock(reading),) if has_times else ()),
             Text(beside.name.removeprefix(twin_signals.TWIN_PREFIX) if beside else ""),
             _cell(beside),
         )
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
-    return Panel(table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left")
+    hidden = max(len(measured) - shown, 0) + max(len(twin) - shown, 0)
+    more = f"{hidden} more signals in a taller terminal" if hidden else None
+    return Panel(
+        table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left", subtitle=more, subtitle_align="right"
+    )
+
+
+def _ordered(readings: Mapping[str, Reading], first: Sequence[str]) -> list[Reading]:
+    """Return readings as a person looks for them: the most telling first, then the known, then those that explain; no JSON."""
+    rank = {name: place for place, name in enumerate(first)}
+
+    def place(reading: Reading) -> tuple[int, bool, bool, str]:
+        is_long = isinstance(reading.value, str) and len(reading.value) > _TEXT_LONG
+        return rank.get(reading.name, len(rank)), reading.value is None, is_long, reading.name
+
+    return sorted((one for one in readings.values() if not _is_json(one)), key=place)
+
+
+def _is_json(reading: Reading) -> bool:
+    """Return True for a value that only programs read: a JSON object or list.
+
+    >>> _is_json(Reading("twin/stops", '{"no data": 1}', 0, Quality.GOOD, None, None, False))
+    True
+    >>> _is_json(Reading("nc_block", "[#25]", 0, Quality.GOOD, None, None, False))
+    False
+    """
+    if not isinstance(reading.value, str) or not reading.value.startswith(("{", "[")):
+        return False
+    try:
+        json.loads(reading.value)
+    except ValueError:
+        return False
+    return True
 
 
 def _cell(reading: Reading | None) -> Text:
@@ -148,4 +208,4 @@ def _clock(reading: Reading | None) -> str:
 
 
 def _ledgers(ledgers: Sequence[StageLedger]) -> Panel:
-    return Panel(ledger_table(ledgers), title="accounted for", title_align="left")
+    return Panel(ledger_table(ledgers, one_row=True), title="accounted for", title_align="left")

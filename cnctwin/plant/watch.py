@@ -62,7 +62,8 @@ def show(
             on_events(host.poll(0.1))
             if time.monotonic() - shown_s >= 0.25:
                 shown_s = time.monotonic()
-                live.update(Cropped(screen(seen(), ledgers(host), note(), console.width), note()), refresh=True)
+                view = screen(seen(), ledgers(host), note(), console.height, console.width)
+                live.update(Cropped(view, note()), refresh=True)
 
 
 def watch(broker: BrokerAddress, group: str, machine: str | None, stop: Event) -> None:

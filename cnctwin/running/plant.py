@@ -2,6 +2,7 @@
 
 import logging
 import os
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -45,7 +46,9 @@ class Plant:
         """Start everything, the broker first; return the address of the page."""
         folder = self.folder
         if not folder.processors.is_file():
-            raise UsageError(f"{folder.root}: has no processors.toml; `cnctwin init {folder.root}` sets a plant up")
+            raise UsageError(
+                f"{folder.root}: has no processors.toml; `cnctwin init {shlex.quote(str(folder.root))}` sets a plant up"
+            )
         folder.state.mkdir(parents=True, exist_ok=True)
         os.environ.update({STATE_VARIABLE: str(folder.state), STORE_VARIABLE: str(folder.root / "store")} | folder.environment())
         broker = ["--broker", self._broker()]

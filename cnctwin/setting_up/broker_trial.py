@@ -28,7 +28,8 @@ def try_broker(broker: BrokerAddress) -> None:
                 host.poll(0.05)
                 waited_s = time.monotonic() - began_s
                 if waited_s > CONNECT_S_MAX or (host.last_error and waited_s > TRIED_AFTER_S):
-                    raise UsageError(f"{broker.url}: {host.last_error or f'no answer in {CONNECT_S_MAX:g} s'}")
+                    error = host.last_error or f"no answer in {CONNECT_S_MAX:g} s"
+                    raise UsageError(error if broker.url in error else f"{broker.url}: {error}")
         finally:
             host.stop(1.0)
     except SparkplugError as error:

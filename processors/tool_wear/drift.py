@@ -9,6 +9,7 @@ not told apart before.
 """
 
 import json
+import shlex
 from datetime import UTC, datetime
 from math import exp
 from typing import NamedTuple
@@ -79,7 +80,7 @@ def in_words(config: Config, drift: Drift, machine: str) -> str:
     lately = f"{_lately_pct(drift):+.1f} %"
     return (
         f"the load of all tools and programs has {way} since {since} against {healthy}, by {lately} lately, so it is not "
-        f"one tool and not one batch; to name the cause: cnctwin gap case --store STORE --machine {machine} "
+        f"one tool and not one batch; to name the cause: cnctwin gap case --store STORE --machine {shlex.quote(machine)} "
         "--out CASE && cnctwin gap diagnose CASE --out diagnosis; with cnctwin twin run it begins by itself"
     )
 

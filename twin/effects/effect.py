@@ -78,6 +78,10 @@ def no_guesses(_: Recorded) -> Guesses:
     return ()
 
 
+OF_SIGNAL = "unit of the signal"
+"""The unit of a parameter that is in that of the signal on which its effect acts."""
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A parameter of an effect.

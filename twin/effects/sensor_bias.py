@@ -3,7 +3,7 @@
 reading = value + bias
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import OF_SIGNAL, Effect, On, Parameter
 from twin.sites import Site
 
 
@@ -22,7 +22,7 @@ EFFECT = Effect(
     says="{on} is read with an offset",
     site=Site.SENSOR,
     on=On.SIGNAL,
-    parameters=(Parameter("bias", "unit of the signal", 0.0, -1e6, 1e6, 1.0, "what it reads too much"),),
+    parameters=(Parameter("bias", OF_SIGNAL, 0.0, -1e6, 1e6, 1.0, "what it reads too much"),),
     changes={"reading": reading},
     shows_in=("{s}",),
     undo=undo,

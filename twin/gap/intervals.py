@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Interval, closure_of
 from twin.gap.fitting import Fitted
-from twin.gap.score import Squares
+from twin.gap.score import Squares, unit_on
 
 Floats = NDArray[np.float64]
 Intervals = dict[Effected, dict[str, Interval]]
@@ -41,7 +41,7 @@ def parameter_intervals(found: Fitted, input_errors: Mapping[str, float] = Mappi
             low, value, high = np.sort(free[i].value(ends)).tolist()
             if also > 0.0:
                 low, high = (value + sign * float(np.hypot(end - value, also * value)) for sign, end in ((-1, low), (1, high)))
-            intervals[effected][p.name] = Interval(value, low, high, p.unit)
+            intervals[effected][p.name] = Interval(value, low, high, unit_on(p.unit, effected.on))
     return intervals
 
 

@@ -10,11 +10,16 @@ from difflib import get_close_matches
 from typing import Any, get_args, get_origin
 
 FAULTS_MAX = 50
+CLOSE = 0.6
+"""The similarity from which on a name is taken for a misspelt one."""
 NAMES_MAX = 16
 VALUE_CHARACTERS_MAX = 60
 _CHOICE = re.compile(r"constrained-|function-|(tuple|list|dict|literal)\[")
 """Parts of a place that no file has: pydantic's names of what a value may be."""
 _SAID = (("Value error, ", ""), ("Assertion failed, ", ""), ("Input should", "should"))
+_NO_SCALAR = {"float_type", "int_type", "bool_type", "string_type"}
+_NO_CONTAINER = {"tuple_type", "list_type", "dict_type", "model_type", "model_attributes_type"}
+"""Types of faults that say only that a value is of another kind."""
 _WORDS: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "string_type": lambda _: "is no text; put it in quotes",
     "string_too_short": lambda c: "is empty; write what it should be" if c["min_length"] == 1 else _too_short(c, "characters"),
@@ -59,7 +64,7 @@ def faults_of(
     >>> faults_of([wrong, extra], Spindle, "spindle.")
     ['spindle.power_kv is not known; did you mean power_kw?', 'spindle.rpm_max = -1: must be above 0']
     """
-    in_order = sorted(faults, key=lambda fault: fault["type"] != "extra_forbidden")
+    in_order = _without_followers(sorted(faults, key=lambda fault: fault["type"] != "extra_forbidden"), model)
     lines = [line for fault in in_order for line in _lines(fault, model, table, shown)]
     return list(dict.fromkeys(lines))
 
@@ -70,7 +75,7 @@ def unknown(what: str, name: str, known: Collection[str]) -> str:
     >>> unknown("[thermel]", "thermel", ["thermal", "gap"]), unknown("[x]", "x", ["thermal", "gap"])
     ('[thermel] is not known; did you mean thermal?', '[x] is not known; known are thermal, gap')
     """
-    if near := get_close_matches(name, list(known), 1, 0.6):
+    if near := get_close_matches(name, list(known), 1, CLOSE):
         return f"{what} is not known; did you mean {near[0]}?"
     more = ", …" if len(known) > NAMES_MAX else ""
     listed = ", ".join(list(known)[:NAMES_MAX])
@@ -96,8 +101,43 @@ def report(source: object, faults: Sequence[str], see: str = "") -> str:
     return "\n  ".join([f"{source}: {len(faults)} faults{after}", *listed])
 
 
+def _without_followers(faults: Sequence[Mapping[str, Any]], model: Any) -> list[Mapping[str, Any]]:
+    """Return the faults without those that only follow from another one.
+
+    A key is not missing where a misspelt one stands for it, and a value that fails in one branch of a choice need not be told
+    that it is none of the other branches' kind.
+    """
+    places = [_place(fault) for fault in faults]
+    meant = {
+        (*place[:-1], near[0])
+        for fault, place in zip(faults, places, strict=True)
+        if fault["type"] == "extra_forbidden"
+        and (near := get_close_matches(str(place[-1]), sorted(_names_at(model, place[:-1])), 1, CLOSE))
+    }
+
+    def follows(at: int) -> bool:
+        kind, place = faults[at]["type"], places[at]
+        if kind == "missing":
+            return place in meant
+        is_inside = isinstance(faults[at].get("input"), list | tuple | dict)
+        others = [
+            other["type"]
+            for number, other in enumerate(faults)
+            if number != at and places[number][: len(place)] == place and (is_inside or places[number] == place)
+        ]
+        own = _NO_SCALAR if is_inside else _NO_CONTAINER
+        return kind in own and any(other not in own for other in others)
+
+    return [fault for at, fault in enumerate(faults) if not follows(at)]
+
+
+def _place(fault: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the place of a fault as the file has it."""
+    return tuple(part for part in fault["loc"] if not _CHOICE.match(str(part)))
+
+
 def _lines(fault: Mapping[str, Any], model: Any, table: str, shown: Callable[[Any], str] | None) -> Iterator[str]:
-    place = tuple(part for part in fault["loc"] if not _CHOICE.match(str(part)))
+    place = _place(fault)
     key = (table + ".".join(map(str, place))).rstrip(". ")
     if fault["type"] == "extra_forbidden":
         yield unknown(key, str(place[-1]), sorted(_names_at(model, place[:-1])))

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from twin.vocabulary.twin_signals import (
     GAP_WINDOW,
 )
 
+DIAGNOSE = "cnctwin gap diagnose CASE --out"
 FILE_BYTES_MAX = 20_000_000
 REPORT_POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; font-src data:; "
@@ -54,6 +56,9 @@ class Gap(Answer):
     basis: str | None
     diagnosis: dict[str, Any] | None
     diagnosis_reason: str | None
+    diagnosis_do: str | None = Field(
+        default=None, description="a command that makes the missing diagnosis where it is looked for"
+    )
     report: str | None
 
 
@@ -71,6 +76,7 @@ def gap_routes(sources: Sources) -> APIRouter:
             **standing(state),
             "diagnosis": diagnosis,
             "diagnosis_reason": reason,
+            "diagnosis_do": None if diagnosis else making(sources.diagnoses, machine),
             "report": f"gap/{machine}/report" if report else None,
         }
 
@@ -82,7 +88,8 @@ def gap_routes(sources: Sources) -> APIRouter:
         folder = folder_of(sources.diagnoses, machine)
         text = await sources.store.work(lambda: _read(folder, "report.html"))
         if text is None:
-            raise ApiError(404, f"machine {machine[:80]!r} has no report; cnctwin gap diagnose CASE --out DIR/{machine[:80]}")
+            do = making(sources.diagnoses, machine) or f"{DIAGNOSE} DIR/{shlex.quote(machine[:80])}"
+            raise ApiError(404, f"machine {machine[:80]!r} has no report; {do}")
         headers = {"Content-Security-Policy": REPORT_POLICY, "X-Frame-Options": "SAMEORIGIN", "Cache-Control": "no-cache"}
         return Response(text, media_type="text/html; charset=utf-8", headers=headers)
 
@@ -118,6 +125,14 @@ def standing(state: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def making(folder: Path | None, machine: str) -> str | None:
+    """Return the command whose diagnosis of a machine this server shows; None where it has no place for one."""
+    try:
+        return f"{DIAGNOSE} {shlex.quote(str(folder_of(folder, machine)))}"
+    except ApiError:
+        return None
+
+
 def diagnosis_of(folder: Path | None, machine: str) -> tuple[dict[str, Any] | None, str | None, bool]:
     """The diagnosis of a machine, else why there is none; and whether there is a report."""
     try:
@@ -127,7 +142,7 @@ def diagnosis_of(folder: Path | None, machine: str) -> tuple[dict[str, Any] | No
     has_report = (own / "report.html").is_file()
     text = _read(own, "diagnosis.json")
     if text is None:
-        return None, f"no diagnosis of {machine} yet; cnctwin gap diagnose CASE --out {own}", has_report
+        return None, f"no diagnosis of {machine} yet; {DIAGNOSE} {shlex.quote(str(own))}", has_report
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:

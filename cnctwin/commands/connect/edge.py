@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +21,8 @@ from cnctwin.terminal.table import left_out, text_table
 if TYPE_CHECKING:
     from edge.adapter import Row
 
+REASON_CHARACTERS_MAX = 40
+"""The length of a reason that a table may repeat."""
 COLUMNS = ("signal", "from", "unit", "native unit", "value now", "why not")
 edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
 
@@ -47,11 +50,13 @@ def check(config: Annotated[Path, typer.Argument(help="The TOML file of one mach
     if as_json:
         sys.stdout.write(json.dumps([asdict(row) for row in rows], default=str) + "\n")
     else:
-        console = standard_output()
-        table = _table(rows, console.width)
+        console, reasons = standard_output(), repeated(rows)
+        table = _table(rows, reasons, console.width)
         console.print(table)
         if missing := left_out(table, COLUMNS):
             console.print(f"no room for: {', '.join(missing)}; a wider terminal or --json shows it", style="dim", soft_wrap=True)
+        for number, reason in enumerate(reasons, 1):
+            console.print(f"({number}) {reason}", markup=False, highlight=False, soft_wrap=True)
 
 
 @edge_app.command()
@@ -67,14 +72,20 @@ def discover(
     sys.stdout.write(draft(url, device=device))
 
 
-def _table(rows: "Sequence[Row]", width: int) -> Table:
-    """Return the signals that an edge would publish, for a person to read."""
+def repeated(rows: "Sequence[Row]") -> tuple[str, ...]:
+    """Return the long reasons that several rows have: each is said once, below the table."""
+    counts = Counter(row.reason for row in rows if row.reason and len(row.reason) > REASON_CHARACTERS_MAX)
+    return tuple(reason for reason, count in counts.items() if count > 1)
+
+
+def _table(rows: "Sequence[Row]", reasons: Sequence[str], width: int) -> Table:
+    """Return the signals that an edge would publish, for a person to read. reasons: those that stand below, by number"""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
     added = "the edge adds its own: tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
-    values = ("–" if row.value is None else str(row.value) for row in rows)
-    cells = [
-        (row.signal, row.source, row.unit or "", row.native_unit or "", value, row.reason or "")
-        for row, value in zip(rows, values, strict=True)
-    ]
+    cells = []
+    for row in rows:
+        value = "–" if row.value is None else str(row.value)
+        why = f"({reasons.index(row.reason) + 1}) below" if row.reason in reasons else row.reason or ""
+        cells.append((row.signal, row.source, row.unit or "", row.native_unit or "", value, why))
     title = f"{signals} signals would be published; {added}"
     return text_table(COLUMNS, cells, width, ("native unit", "unit", "from"), title=title, show_edge=True)

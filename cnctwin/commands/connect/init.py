@@ -1,5 +1,6 @@
 """`cnctwin init`: set a plant's folder up, by questions or by options."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -66,5 +67,5 @@ def init(
         raise typer.Exit(1) from None
     write_all(files)
     tell("nothing has changed" if not files else f"{len(files)} file{'s' if len(files) > 1 else ''} written")
-    at = "" if root == Path.cwd() else f" {folder}"
+    at = "" if root == Path.cwd() else f" {shlex.quote(str(folder))}"
     tell(f"start it with `cnctwin up{at}`; the page is on http://127.0.0.1:8080 then")

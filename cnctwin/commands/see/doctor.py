@@ -30,7 +30,7 @@ def doctor(
         list[Path] | None,
         typer.Option(
             help="Configuration or log for the bundle, a file or a folder; may be given again; else processors.toml, edges, "
-            "machines and logs of this folder",
+            "machines, logs and state/logs of this folder",
             show_default=False,
         ),
     ] = None,
@@ -59,8 +59,8 @@ def doctor(
                     f"{UNMAPPED}: values of the control that the edge's configuration maps to no signal", soft_wrap=True
                 )
     if bundle is not None:
-        from cnctwin.plant.bundle import write_bundle
+        from cnctwin.plant.bundle import summary, write_bundle
 
         names = write_bundle(bundle, report.as_json(), include or ())
-        print(f"{bundle}: {len(names)} files, secrets taken out; look through it before you send it", file=sys.stderr)
+        print(summary(bundle, names), file=sys.stderr)
     raise typer.Exit(0 if report.good else 1)

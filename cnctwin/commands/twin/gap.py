@@ -72,7 +72,7 @@ def score(
         sys.stdout.write(json.dumps(score_json(found)) + "\n")
         return
     signals = Table(title=f"{machine.machine.name} on {recorded.name}: {found.gap:.3g} × the repeatability", title_justify="left")
-    for column in ("signal", "rms", "floor", "unit", "×"):
+    for column in ("signal", "rms", "repeatability", "unit", "×"):
         signals.add_column(column, justify="left" if column in ("signal", "unit") else "right")
     for signal, one in found.by_signal.items():
         signals.add_row(signal, f"{one.rms:.4g}", f"{one.floor:.4g}", one.unit, f"{one.rms / one.floor:.2f}")
@@ -132,7 +132,7 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
     console.print(
         f"gap {gap.before:.3g} → {gap.after:.3g} × the repeatability; closed {100 * gap.closure:.1f} % "
         f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}) of its square, on runs {unseen}; "
-        f"as stated {gap.as_stated:.3g}",
+        f"with the constants of the machine file {gap.as_stated:.3g}",
         highlight=False,
         soft_wrap=True,
     )
@@ -159,7 +159,7 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
 def _causes_table(found: "Diagnosis") -> Table:
     """Return the table of causes, with intervals."""
     causes = Table(title="causes", title_justify="left")
-    for column in ("effect", "on", "parameters (90 %)", "share", "not to be told from"):
+    for column in ("effect", "on", "parameters (90 %)", "share", "cannot be told apart from"):
         causes.add_column(column, justify="right" if column == "share" else "left")
     for cause in found.causes:
         parameters = ", ".join(

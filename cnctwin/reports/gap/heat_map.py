@@ -78,7 +78,7 @@ def _map(title: str, cells: Table, signals: Sequence[str], regimes: Sequence[str
         )
         for signal in signals
     ]
-    caption = tag("caption", title, tag("span", ", rms over the floor", class_="unseen"))
+    caption = tag("caption", title, tag("span", ", rms in multiples of the repeatability", class_="unseen"))
     table = tag("table", caption, tag("thead", head), tag("tbody", *rows), class_="heat" if named else "heat second")
     return scrollable(f"{title}: gap by signal and regime", table)
 
@@ -102,7 +102,7 @@ def _legend() -> Markup:
     dot = tag("span", tag("b", "4.20"), class_="swatch h3 found")
     return tag(
         "p",
-        tag("span", "rms of twin − recording over the floor", class_="of"),
+        tag("span", "rms of twin − recording, × repeatability", class_="of"),
         tag("span", *scale, class_="scale"),
         tag("span", dot, " stands out beyond chance (false discoveries controlled)", class_="of"),
         class_="legend",

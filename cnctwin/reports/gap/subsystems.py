@@ -12,7 +12,7 @@ _WORD = {
     Verdict.HEALTHY: "healthy",
     Verdict.EXPLAINED: "explained",
     Verdict.PARTLY: "partly explained",
-    Verdict.UNKNOWN: "not understood",
+    Verdict.UNKNOWN: "cause unknown",
 }
 
 

@@ -91,9 +91,9 @@ def _caption(trace: Trace, name: str) -> Markup:
     keys = [_key("measured", "measured"), _key("before", "twin before" if changed(trace) else "twin")]
     if changed(trace):
         keys.append(_key("after", "twin after"))
-    keys.append(_key("band", "floor"))
+    keys.append(_key("band", "repeatability"))
     role = "fitted" if trace.fitted else "not fitted"
-    about = f"{times(over_floor(trace))} × floor · {trace.run}, {role}"
+    about = f"{times(over_floor(trace))} × repeatability · {trace.run}, {role}"
     return tag("figcaption", tag("h3", name), tag("p", about, class_="quiet"), tag("p", *keys, class_="keys"))
 
 

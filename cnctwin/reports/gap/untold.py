@@ -88,12 +88,15 @@ def judged(diagnosed: Diagnosed) -> Markup:
     )
     refitted = (
         "With the machine's constants refitted within their stated uncertainty, which is no cause: from "
-        f"{times(gap.as_stated)} × as stated to {times(gap.before)} ×."
+        f"{times(gap.as_stated)} × with those of the machine's file to {times(gap.before)} ×."
     )
     facts = [
-        ("Floor", floor),
+        ("Repeatability", floor),
         ("Before", refitted),
-        ("Closed", "1 − (after² − floor²) / (before² − floor²): the share of the gap above the floor that is gone."),
+        (
+            "Closed",
+            "1 − (after² − 1) / (before² − 1), in multiples of the repeatability: the share of the gap above it that is gone.",
+        ),
         ("Not fitted", ", ".join(used[False]) or "No run was kept back."),
         ("Fitted", ", ".join(used[True]) or "No run of those shown."),
         ("Machine", diagnosed.twin.machine.name),

@@ -48,10 +48,10 @@ def _times(value: float) -> Markup:
 def _change(diagnosis: Diagnosis) -> Markup:
     gap = diagnosis.gap
     if not diagnosis.causes:
-        return tile("Gap", _times(gap.before), "rms of twin − recording, over the floor")
+        return tile("Gap", _times(gap.before), "rms of twin − recording, × repeatability")
     arrow = joined([tag("span", " → ", class_="arrow", aria_hidden="true"), tag("span", " to ", class_="unseen")])
     return tile(
-        "Gap, before → after", joined([times(gap.before), arrow, _times(gap.after)]), "rms of twin − recording, over the floor"
+        "Gap, before → after", joined([times(gap.before), arrow, _times(gap.after)]), "rms of twin − recording, × repeatability"
     )
 
 
@@ -62,13 +62,13 @@ def _closed(diagnosis: Diagnosis) -> Markup:
     if not diagnosis.causes:
         return tile("Closed", "nothing", "no effect of the catalogue is its cause")
     between = f"{share(gap.closure_low).removesuffix(' %')} … {share(gap.closure_high)}, with 90 % confidence"
-    meaning = between if known(gap.closure_low) and known(gap.closure_high) else "of the gap above the floor"
+    meaning = between if known(gap.closure_low) and known(gap.closure_high) else "of the gap above the repeatability"
     return tile("Closed of what can be closed", share(gap.closure), meaning)
 
 
 def _floor(gap: GapNumbers) -> Markup:
-    return tile("Floor", _times(gap.floor), "what repeated runs of the machine differ by")
+    return tile("Repeatability", _times(gap.floor), "what repeated runs of the machine differ by")
 
 
 def _stated(gap: GapNumbers) -> Markup:
-    return tile("As stated", _times(gap.as_stated), "by the machine's file, before its constants were refitted")
+    return tile("Gap of the file as it is", _times(gap.as_stated), "before the constants of the machine's file were refitted")

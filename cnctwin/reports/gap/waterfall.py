@@ -30,9 +30,9 @@ def how_far(diagnosis: Diagnosis) -> Markup:
     """The section."""
     gap = diagnosis.gap
     if diagnosis.verdict is Verdict.HEALTHY or not (known(gap.before) and known(gap.floor) and gap.before > gap.floor):
-        lead = f"There is nothing to close: {times(gap.before)} × floor is no more than what repeated runs differ by."
+        lead = f"There is nothing to close: {times(gap.before)} × the repeatability is no more than what repeated runs differ by."
         return section("far", "How far it shrinks", lead, _by_signal(gap))
-    total = f"{share(gap.closure)} of the gap above the floor is closed"
+    total = f"{share(gap.closure)} of the gap above the repeatability is closed"
     if known(gap.closure_low) and known(gap.closure_high):
         total += f" (90 % interval {share(gap.closure_low)} to {share(gap.closure_high)})"
     lead = f"{total}, judged on runs that were not fitted." if diagnosis.causes else "Nothing in the catalogue closes it."
@@ -42,7 +42,7 @@ def how_far(diagnosis: Diagnosis) -> Markup:
 def steps(diagnosis: Diagnosis) -> Iterator[Step]:
     """The gap before, a step for each cause, largest first, the remainder without a name."""
     gap = diagnosis.gap
-    yield Step("Before", "before", 0.0, 1.0, "100 %", f"{times(gap.before)} × floor")
+    yield Step("Before", "before", 0.0, 1.0, "100 %", f"{times(gap.before)} × repeatability")
     left = 1.0
     for cause in sorted(diagnosis.causes, key=lambda c: -c.closure if known(c.closure) else 0.0):
         size = min(max(cause.closure, 0.0), left) if known(cause.closure) else 0.0
@@ -52,7 +52,12 @@ def steps(diagnosis: Diagnosis) -> Iterator[Step]:
     if diagnosis.causes and known(gap.closure):
         left = 1.0 - min(max(gap.closure, 0.0), 1.0)
     yield Step(
-        "Without a name", "rest", 0.0, left, share(left), f"{times(gap.after if diagnosis.causes else gap.before)} × floor"
+        "Without a name",
+        "rest",
+        0.0,
+        left,
+        share(left),
+        f"{times(gap.after if diagnosis.causes else gap.before)} × repeatability",
     )
 
 
@@ -94,7 +99,7 @@ def _chart(drawn: list[Step], gap: GapNumbers) -> Markup:
     ]
     floor = tag(
         "tr",
-        tag("th", "Floor", scope="row"),
+        tag("th", "Repeatability", scope="row"),
         tag(
             "td",
             tag(
@@ -102,10 +107,10 @@ def _chart(drawn: list[Step], gap: GapNumbers) -> Markup:
             ),
         ),
         tag("td", "0 %", class_="number"),
-        tag("td", f"{times(gap.floor)} × floor", class_="number quiet"),
+        tag("td", f"{times(gap.floor)} ×", class_="number quiet"),
         class_="is-floor",
     )
-    head = each("th", ("Step", "Gap above the floor (rms² − floor²)", "Share", "Rms"), scope="col")
+    head = each("th", ("Step", "Gap above the repeatability (rms² − repeatability²)", "Share", "Rms"), scope="col")
     return tag("table", tag("thead", tag("tr", head)), tag("tbody", *rows, floor), class_="waterfall")
 
 
@@ -117,12 +122,12 @@ def _by_signal(gap: GapNumbers) -> Markup | None:
         [2.0, *(ratio for name in signals if known(ratio := _ratio(gap.by_signal[name].before, gap.by_signal[name].floor)))]
     )
     top = math.log(largest) * 1.04
-    head = ("Signal", "Before", "After", "Floor", "Unit", "Over the floor", "Closed")
+    head = ("Signal", "Before", "After", "Repeatability", "Unit", "× repeatability", "Closed")
     rows = [_signal_row(name, gap.by_signal[name], top) for name in signals]
     table = tag(
         "table", tag("thead", tag("tr", *(tag("th", h, scope="col") for h in head))), tag("tbody", *rows), class_="data signals"
     )
-    shapes = [("●", "before", " before, "), ("◆", "after", f" after; from the floor to {times(largest)} ×, logarithmic")]
+    shapes = [("●", "before", " before, "), ("◆", "after", f" after; from 1 to {times(largest)} ×, logarithmic")]
     key = joined(part for sign, kind, says in shapes for part in (tag("span", sign, class_=f"key {kind}"), says))
     return joined([tag("h3", "By signal"), scrollable("The gap by signal", table), tag("p", key, class_="note signals-key")])
 

@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict
 from cnctwin.errors import UsageError
 from cnctwin.files.sealed import Sealed, read_sealed, seal, write_sealed
 from twin.effects.catalogue import effect_named
+from twin.gap.score import unit_on
 from twin.machine import AddedEffect
 
 EFFECTS = Path(__file__).with_name("hidden_effects.toml")
@@ -115,7 +116,7 @@ def statement(added: AddedEffect) -> dict[str, Any]:
     effect = effect_named(added.effect)
     known = {parameter.name: parameter for parameter in effect.parameters}
     shown = {
-        name: {"value": value, "unit": known[name].unit, "meaning": known[name].meaning}
+        name: {"value": value, "unit": unit_on(known[name].unit, added.on), "meaning": known[name].meaning}
         for name, value in added.parameters.items()
         if value != known[name].null
     }

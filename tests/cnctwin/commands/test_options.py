@@ -9,6 +9,7 @@ import typer
 import typer.main
 
 from cnctwin.cli import GROUPS, app
+from cnctwin.commands.without_argument import EXAMPLES, explained
 
 SAME = {
     "--broker",
@@ -100,3 +101,13 @@ def test_an_option_is_explained_by_words_that_stand_alone() -> None:
     """A help is read in a list, in any order: it cannot lean on the line before it."""
     leaning = re.compile(r"(Of|And|Or|Its|The same|That|Whose)\b")
     assert [one for one in OPTIONS if not one.help or leaning.match(one.help)] == []
+
+
+def test_an_option_without_its_argument_gets_an_example_and_its_own_command() -> None:
+    group = typer.main.get_command(app)
+    for option in OPTIONS:
+        if not option.names or isinstance(option.default, bool):
+            continue
+        told = explained(group, option.command.split(), option.names[0])
+        assert told and f"as in {option.names[0]} " in told and told.endswith(f"see cnctwin {option.command} --help"), option
+    assert EXAMPLES.keys() <= {name for option in OPTIONS for name in option.names}

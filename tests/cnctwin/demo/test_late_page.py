@@ -45,5 +45,5 @@ def test_a_page_that_comes_late_is_found_and_keeps_its_port(tmp_path: Path, monk
     assert (demo.page_url, demo.page_trouble != "") == ("", True)
     (tmp_path / "page.json").write_text('{"url": "http://127.0.0.1:8765"}')
     demo.watch()
-    assert (page_line(demo), page.command[-1]) == ("page:      http://127.0.0.1:8765", "8765")
+    assert (page_line(demo), page.command[-1]) == ("page:      http://127.0.0.1:8765/#/gap/vmc", "8765")
     demo.stop()

@@ -13,6 +13,7 @@ from cnctwin.errors import UsageError
 from cnctwin.machines.starters import machine_classes, starter_text
 from tests.twin.programs.plate import SETTINGS
 from twin.case import Case, RunAtHand, RunEntry, RunKind
+from twin.errors import MachineError
 from twin.gap.diagnose import diagnose
 from twin.identification.identify import Identification, identify
 from twin.live.assumed import completed
@@ -143,3 +144,27 @@ def test_a_diagnosis_begins_with_it(identified: tuple[Case, Identification]) -> 
     done = diagnose(Case(case.name, found.machine, case.runs))
     assert done.diagnosis.verdict.value in ("healthy", "explained")
     assert done.twin.assumed.keys() <= found.machine.assumed.keys()
+
+
+SLIPS = {
+    "mass_kg = 1500.0 -> mas_kg = 1500.0": "axes.x.mas_kg is not known; did you mean mass_kg?",
+    "torque_limit_a = 60.0 -> torque_limit_a = -40.0": "axes.x.torque_limit_a = -40.0: must be above 0",
+    "coulomb_n = 400.0 -> coulomb_n = 'lots'": "axes.x.friction.coulomb_n = 'lots': is no number; write one without quotes",
+    "coulomb_n = 400.0 -> coulomb_n = [-1.0, 2.0]": "axes.x.friction.coulomb_n.0 = -1.0: must be 0 or more",
+    "mass_kg = 1500.0\n -> ": "axes.x.mass_kg is missing",
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_one_slip_in_a_file_that_assumes_is_one_fault(slip: str) -> None:
+    right, wrong = slip.split(" -> ")
+    with pytest.raises(MachineError) as error:
+        machine_from_toml(starter_text("five-axis", "vmc").replace(right, wrong, 1), "vmc.toml")
+    assert str(error.value).startswith(f"vmc.toml: {SLIPS[slip]}")
+    assert "\n" not in str(error.value)
+
+
+def test_an_assumption_of_what_the_file_does_not_state_is_a_fault() -> None:
+    text = starter_text("five-axis", "vmc") + '\n[assumed."axes.q.mass_kg"]\nsource = "none"\n'
+    with pytest.raises(MachineError, match=r"axes\.q\.mass_kg is assumed, but the file does not state it"):
+        machine_from_toml(text, "vmc.toml")

@@ -161,6 +161,7 @@ def gap(machine: str, found: dict[str, Any] | None) -> dict[str, Any]:
         "basis": "spindle_temp_c: thermal network, floor 0.3 K configured. healthy: assumed, the first 336 h that were seen",
         "diagnosis": found,
         "diagnosis_reason": None if found else f"no diagnosis of {machine} yet",
+        "diagnosis_do": None if found else f"cnctwin gap diagnose CASE --out diagnoses/{machine}",
         "report": f"gap/{machine}/report" if found else None,
     }
 

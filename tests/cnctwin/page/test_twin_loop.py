@@ -66,7 +66,7 @@ def test_a_stranger_goes_from_the_open_gap_to_the_closed_one_and_opens_the_seal(
     ):
         expect(panel(page).locator(".answer")).to_contain_text(text)
     press(page, "promote")
-    expect(page.get_by_role("dialog")).to_contain_text("Back undoes it")
+    expect(page.get_by_role("dialog")).to_contain_text("The button Back makes the present description live again")
     page.get_by_role("dialog").get_by_role("button", name="Promote").click()
     expect(panel(page)).to_contain_text("gap of the temperature 6.1 → 1.1 × repeatability")
     press(page, "reveal")

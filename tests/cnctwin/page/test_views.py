@@ -145,7 +145,7 @@ def test_the_gap_has_a_place_a_cause_and_a_next_step(visit: Visit) -> None:
     page.keyboard.press("]")
     page.keyboard.press("[")
     page = visit.open("#/gap/mill-01")
-    expect(main).to_contain_text("cnctwin gap diagnose CASE --out DIAGNOSES/mill-01")
+    expect(main).to_contain_text("cnctwin gap diagnose CASE --out diagnoses/mill-01")
 
 
 def test_an_alert_is_acknowledged_with_name_and_comment(visit: Visit, shop: Shop) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.plant.bundle import LOG_BYTES_MAX, write_bundle
+from cnctwin.plant.bundle import LOG_BYTES_MAX, NO_LOGS, summary, write_bundle
 
 PLANTED = {
     "in an address": "hunter2-address",
@@ -121,3 +121,23 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         write_bundle(tmp_path / "b.zip", {}, [tmp_path / "none.toml"])
     with pytest.raises(UsageError, match="name a file that can be written"):
         write_bundle(tmp_path / "none" / "b.zip", {}, [tmp_path])
+
+
+def test_the_logs_of_a_running_plant_are_taken_without_being_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = tmp_path / "state" / "logs"
+    logs.mkdir(parents=True)
+    (logs / "edge.log").write_text("no answer from the control\n")
+    monkeypatch.chdir(tmp_path)
+    names = write_bundle(Path("bug.zip"), {}, [], {})
+    assert "logs/state/logs/edge.log" in names
+    with zipfile.ZipFile("bug.zip") as bundle:
+        assert bundle.read("logs/state/logs/edge.log") == b"no answer from the control\n"
+        assert "Logs: 1\n" in bundle.read("README.txt").decode()
+
+
+def test_a_bundle_without_logs_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names = write_bundle(Path("bug.zip"), {}, [], {})
+    assert NO_LOGS in summary(Path("bug.zip"), names)
+    with zipfile.ZipFile("bug.zip") as bundle:
+        assert f"Logs: {NO_LOGS}\n" in bundle.read("README.txt").decode()

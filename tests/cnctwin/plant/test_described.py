@@ -83,6 +83,11 @@ def test_a_connected_machine_that_nobody_has_described_is_named_with_the_way_out
     )
 
 
+def test_a_command_for_a_name_with_a_space_can_be_typed() -> None:
+    ((_, line),) = said(LiveDescriptions(), "Fräse 1")
+    assert "--machine 'Fräse 1' --out 'Fräse 1.toml'" in line
+
+
 def test_a_challenger_that_waits_is_told_with_the_commands_that_weigh_and_promote_it() -> None:
     found = heard(live=message(KNOWN), challenger=message(TOML, step="filed", by="loop", why="coolant cools"))
     (_, _), (good, line) = said(found)

@@ -95,6 +95,29 @@ def test_the_screen_shows_every_machine_its_twin_and_the_ledgers() -> None:
     assert view.index("exec_state") < view.index("a_signal_of_its_own"), "the most telling signals come first"
 
 
+def crowded() -> Pictures:
+    own = {f"signal_{number:02d}": number for number in range(40)} | {"exec_state": "ACTIVE", "alarms": "[]"}
+    twin = {"twin/stops": '{"no data":{"s":9}}', "twin/basis": "told " * 9, "twin/shift": "early", "twin/spindle_temp_c": None}
+    pictures = Pictures().add("edge-vmc", owner(balance(9, 9)), {"vmc": owner(own)})
+    for number in range(11):
+        pictures.add(f"twin-{number}", owner(balance(9, 5, {"unchanged": 3, "superseded": 1})), {"vmc": owner(twin)})
+    return pictures
+
+
+def test_on_a_terminal_of_forty_rows_the_ledger_of_every_stage_stays_in_sight() -> None:
+    rows = shown(screen(machines(crowded()), ledgers(crowded()), "Ctrl-C ends the demo", 40)).rstrip("\n").splitlines()
+    assert len(rows) <= 40
+    whole = "\n".join(rows)
+    for expected in ("exec_state", "edge-vmc", "twin-10", "Ctrl-C", "more signals in a taller terminal"):
+        assert expected in whole, expected
+
+
+def test_values_that_people_read_come_first_and_json_is_left_to_programs() -> None:
+    view = shown(screen(machines(crowded()), ledgers(crowded()), "", None))
+    assert "no data" not in view and "alarms" not in view
+    assert view.index("spindle_temp_c") < view.index("shift") < view.index("basis")
+
+
 def test_a_name_with_brackets_is_text_and_no_markup() -> None:
     odd = Pictures().add("edge-[/]", owner(balance(1, 1)), {"[/red]": owner({"exec_state": "[/bold]", "[/x]": 1})})
     view = shown(screen(machines(odd), ledgers(odd), "[/note]"))

@@ -57,7 +57,7 @@ def test_a_terminal_that_cannot_move_its_cursor_gets_lines_too() -> None:
 def test_a_low_terminal_says_how_to_see_the_rest() -> None:
     console = Console(file=io.StringIO(), width=80, height=12, force_terminal=True, _environ={"TERM": "xterm"})
     host = plant()
-    console.print(Cropped(screen(machines(host), ledgers(host), "a note", console.width), "a note"))
+    console.print(Cropped(screen(machines(host), ledgers(host), "a note", width=console.width), "a note"))
     lines = str(console.file.getvalue()).splitlines()  # type: ignore[attr-defined]
     assert len(lines) == 11
     assert "twin and rules" in lines[1]

@@ -54,7 +54,7 @@ def lines(model: type[BaseModel], value: Any, **options: Any) -> list[str]:
         ({"fron": "x"}, ["fron is not known; did you mean from?"]),
         ({"zzz": 1}, ["zzz is not known; known are axes, from, name, receivers, shifts, spare"]),
         ({"axes": {"x": {"mass_kg": 1, "lead_m": 2}}}, ["axes.x.lead_m is not known; did you mean lead_mm?"]),
-        ({"shifts": [{"mass": 1}]}, ["shifts.0.mass is not known; did you mean mass_kg?", "shifts.0.mass_kg is missing"]),
+        ({"shifts": [{"mass": 1}]}, ["shifts.0.mass is not known; did you mean mass_kg?"]),
         ({"spare": {"mass_kg": 0}}, ["spare.mass_kg = 0: must be above 0"]),
         (
             {"spare": {"mass_kg": 1, "friction_n": "much"}},
@@ -67,7 +67,7 @@ def lines(model: type[BaseModel], value: Any, **options: Any) -> list[str]:
     ],
 )
 def test_a_fault_names_its_place_and_the_nearest_right_name(value: dict[str, Any], said: list[str]) -> None:
-    assert lines(Plant, value)[: len(said)] == said
+    assert lines(Plant, value) == said
 
 
 def test_a_model_around_a_mapping_knows_the_names_below_it() -> None:

@@ -53,9 +53,8 @@ def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
     # a part that is compared alone may be far off where all that is compared as a whole is not
     gap = told.gap.before if told.gap.before > FAR else max([told.gap.before, *(s.explained.base.left.gap() for s in unknown)])
     place = f"in {where}" if where else _most(told.where)
-    return (
-        f"Unknown: a gap of {gap:.3g} × the floor{f' {place}' if place else ''} that no effect of the catalogue explains{partly}"
-    )
+    size = f"{gap:.3g} × the repeatability{f' {place}' if place else ''}"
+    return f"Unknown: a gap of {size} that no effect of the catalogue explains{partly}"
 
 
 def _most(cells: Sequence[Cell]) -> str:
@@ -72,7 +71,7 @@ def _parts(subsystems: Sequence[Subsystem]) -> list[str]:
     said = [f"{_part(s)} healthy" for s in told]
     for part in wrong:
         named = f", in {_joined(part.causes)}" if part.causes else ""
-        said.append(f"{_part(part)} {part.before:.2g} floors{named}")
+        said.append(f"{_part(part)} {part.before:.2g} × the repeatability{named}")
     return said
 
 

@@ -1,5 +1,6 @@
 """The commands below `cnctwin train`; what they do is imported when one of them is run."""
 
+import shlex
 from datetime import UTC, datetime
 from pathlib import Path
 from types import ModuleType
@@ -112,7 +113,7 @@ def train_sample(
 
     with working("simulating"):
         write(write_weeks, out)
-    print(f"train from it: cnctwin train anomaly {' '.join(f'{week.machine}={week.file}' for week in made)}")
+    print(f"train from it: cnctwin train anomaly {shlex.join(f'{week.machine}={week.file}' for week in made)}")
 
 
 @train_app.command("check")

@@ -292,3 +292,6 @@ export const inPageWords = (text) => String(text ?? "").replace(/(\d) floors\b/g
 
 /** The name of an effect or a part, in words. */
 export const words = (name) => capital(String(name ?? "").replaceAll("_", " "));
+
+/** A word of a command as a shell reads it: quoted where it needs to be. */
+export const typed = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", `'"'"'`)}'`);

@@ -1,12 +1,13 @@
 """The gap of a machine, its diagnosis and its report, from their folder and nowhere else."""
 
 import json
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from cnctwin.api.routes.gap import folder_of
+from cnctwin.api.routes.gap import folder_of, making
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import THERMAL, Client, birth, client_of, reading, small_plant
 
@@ -70,6 +71,7 @@ def test_where_there_is_none_it_says_how_to_make_one(client: Client) -> None:
     told = client.get("/gap/undiagnosed").json()
     assert (told["diagnosis"], told["report"]) == (None, None)
     assert "cnctwin gap diagnose" in told["diagnosis_reason"]
+    assert told["diagnosis_do"].startswith("cnctwin gap diagnose CASE --out /") and told["diagnosis_do"].endswith("/undiagnosed")
     broken = client.get("/gap/broken").json()
     assert broken["diagnosis"] is None
     assert "cannot be read" in broken["diagnosis_reason"]
@@ -102,7 +104,13 @@ def test_a_name_that_is_no_folder_s_is_refused(tmp_path: Path, machine: str) -> 
         folder_of(tmp_path, machine)
 
 
+def test_a_command_for_a_name_with_a_space_can_be_typed() -> None:
+    command = making(Path("all of them"), "Fräse 1")
+    assert command is not None and shlex.split(command)[-1] == "all of them/Fräse 1"
+
+
 def test_without_a_folder_it_says_so() -> None:
     with client_of(small_plant()) as client:
+        assert client.get("/gap/vmc").json()["diagnosis_do"] is None
         assert "--diagnoses" in client.get("/gap/vmc").json()["diagnosis_reason"]
         assert client.get("/gap/vmc/report").status_code == 404

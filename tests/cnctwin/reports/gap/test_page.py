@@ -84,7 +84,7 @@ def test_parts_constants_and_learned_terms_have_sections_of_their_own_where_ther
     headings = [heading["id"] for heading in page.of("h2")]
     assert headings[0] == "subsystems" and {"learned", "constants"} < set(headings)
     assert page.text.index("X controller") < page.text.index("X mechanics") < page.text.index("Cut")
-    for said in ("not understood", "Two pushes of 30 N.", "direction friction on X, but it closes 31 %", "moving in −", "2.4 σ"):
+    for said in ("cause unknown", "Two pushes of 30 N.", "direction friction on X, but it closes 31 %", "moving in −", "2.4 σ"):
         assert said in page.text
 
 

@@ -63,7 +63,8 @@ def told(verdict: Verdict, **fields: Any) -> Diagnosis:
             Verdict.PARTLY,
             {"causes": (FRICTION,), "subsystems": PARTS, "learned": (PUSH,), "where_after": (LEFT,)},
             "Partly explained: 77 % of the gap comes from direction friction on X (-0.16 ± 0.02; or gravity); 23 % remains, most "
-            "of it in the X torque while it accelerates; X controller healthy; X mechanics 8 floors, in direction friction; "
+            "of it in the X torque while it accelerates; X controller healthy; X mechanics 8 × the repeatability, in direction "
+            "friction; "
             "described: a force on X of +43 N between 118 and 141 mm.",
         ),
     ],
@@ -78,11 +79,13 @@ def test_an_unknown_gap_is_said_with_its_stage_and_its_size() -> None:
     stage = judged(explain(OneLine(bias=2.0, candidates=())))
     sentence = sentence_of(told(Verdict.UNKNOWN, learned=(PUSH,)), (stage,))
     assert sentence.startswith(
-        "Unknown: a gap of 8 × the floor in one line that no effect of the catalogue explains; described: "
+        "Unknown: a gap of 8 × the repeatability in one line that no effect of the catalogue explains; described: "
     )
 
 
 def test_a_gap_in_places_that_no_stage_minds_is_said_without_a_stage() -> None:
     place = Cell("x_torque_a", "reversal", 0.9, 2.0, 6.0, 1e-6, True, "")
     said = sentence_of(told(Verdict.UNKNOWN, where=(place,)), [])
-    assert said == "Unknown: a gap of 8 × the floor in the X torque at reversals that no effect of the catalogue explains."
+    assert (
+        said == "Unknown: a gap of 8 × the repeatability in the X torque at reversals that no effect of the catalogue explains."
+    )

@@ -57,7 +57,7 @@ function verdict(diagnosis, report) {
       fact("Gap, before → after", `${number(gap.before)} → ${number(gap.after)}`, `rms, ${REPEATABILITY}, on runs not fitted`),
       fact("Closed of what can be closed", share(gap.closure), between),
       fact("Repeatability", number(gap.floor ?? 1), "what two runs of the same program differ by"),
-      Number.isFinite(gap.as_stated) ? fact("As stated", number(gap.as_stated), "before constants were refitted") : null,
+      Number.isFinite(gap.as_stated) ? fact("Gap of the file as it is", number(gap.as_stated), "before the constants of the machine's file were refitted") : null,
     ),
     report
       ? el("p", {}, el("a", { class: "button report", href: report, target: "_blank", rel: "noopener" }, "Open the whole report"))

@@ -9,7 +9,7 @@ const CALLED = lookup({
   healthy: "healthy",
   explained: "explained",
   partly_explained: "partly explained",
-  unknown: "not understood",
+  unknown: "cause unknown",
 });
 const SITES = lookup({ axis_force: "Force", friction: "Friction", heat_input: "Heat input", heat_loss: "Heat loss" });
 
@@ -43,7 +43,7 @@ function parts(found) {
       el("td", {}, list(one.causes).map(words).join(", ")),
     ),
   );
-  const titles = [["Part"], ["Compared"], ["Floors before"], ["After"], ["Verdict"], ["Causes"]];
+  const titles = [["Part"], ["Compared"], ["Before, × repeatability"], ["After"], ["Verdict"], ["Causes"]];
   return el("section", {}, el("h2", {}, "Part by part"), table("Parts compared alone", "where", titles, rows));
 }
 

@@ -14,6 +14,7 @@ import {
   sentence,
   signed,
   title,
+  typed,
 } from "../text.js";
 import { serverNow } from "../clock.js";
 import { TILES, tileOf } from "../charted.js";
@@ -106,7 +107,7 @@ function standing(gap) {
       el(
         "p",
         {},
-        "No standing gap yet: it is worked out over some minutes of each regime. What twin and machine differ by at this moment stands above.",
+        "No standing gap yet. A signal whose repeatability is given has one after about a minute in a regime. The repeatability of the others is learned first: the reasons below say until when. What twin and machine differ by at this moment stands above.",
       ),
       why,
     ];
@@ -198,8 +199,12 @@ function noDiagnosis(name, gap) {
       {},
       "Press Diagnose above: the loop cuts the last stretch of production out of the history and looks for the effect that makes the gap. Runs that you have recorded yourself make a case too:",
     ),
-    el("pre", {}, `cnctwin gap diagnose CASE --out DIAGNOSES/${name}\ncnctwin serve --diagnoses DIAGNOSES`),
-    gap?.diagnosis_reason ? el("p", { class: "note" }, `The server says: ${gap.diagnosis_reason}`) : null,
+    el(
+      "pre",
+      {},
+      gap?.diagnosis_do ?? `cnctwin gap diagnose CASE --out ${typed(`DIAGNOSES/${name}`)}\ncnctwin serve --diagnoses DIAGNOSES`,
+    ),
+    gap?.diagnosis_reason && !gap.diagnosis_do ? el("p", { class: "note" }, `The server says: ${gap.diagnosis_reason}`) : null,
   );
 }
 
@@ -250,8 +255,9 @@ export function open(app, { machine: named }) {
       now.write();
       loop.write();
     };
+  const watched = el("p", {}, el("a", { href: app.address("machine", name) }, `Watch ${name} cut`), ": its curves and the twin's, live");
   const present = el("section", {}, el("h2", {}, "At this moment, measured − twin"), now.host);
-  element.append(head.element, loop.element, present, trouble, body, asOf);
+  element.append(head.element, watched, loop.element, present, trouble, body, asOf);
   now.write();
   let shown = "",
     heardAt = null;

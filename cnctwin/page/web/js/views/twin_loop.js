@@ -174,7 +174,7 @@ export function twinLoop(app, name, changed = () => {}) {
   function askPromote() {
     const about = [
       el("p", {}, inWords(loop.challenger.sentence)),
-      el("p", {}, `From then on this is the live twin of ${name}, in every figure and every job. Back undoes it.`),
+      el("p", {}, `From then on this is the live twin of ${name}, in every figure and every job. The button Back makes the present description live again.`),
     ];
     openAsked(`Promote the challenger of ${name}`, about, "Promote", () => ordered("promote", loop.challenger.version));
   }

@@ -119,7 +119,7 @@ function bar(kind, word, value, full) {
 /** The standing gap by signal, live and of the challenger. standing: signal → {live, challenger}, as multiples of the repeatability. */
 export function bars(standing, hasChallenger) {
   const rows = Object.entries(standing).filter(([, one]) => Number.isFinite(one.live) || Number.isFinite(one.challenger));
-  if (!rows.length) return el("p", { class: "quiet" }, "No standing gap yet: it is worked out over the first minute of production.");
+  if (!rows.length) return el("p", { class: "quiet" }, "No standing gap yet; below stands when each signal has one.");
   const full = Math.max(FULL_MIN, ...rows.flatMap(([, one]) => [one.live ?? 0, one.challenger ?? 0])) * 1.05;
   return el(
     "div",
