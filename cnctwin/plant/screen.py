@@ -52,6 +52,9 @@ _TWIN_FIRST = (
 )
 _STYLE = {Quality.GOOD: "", Quality.STALE: "dim", Quality.BAD: "red"}
 _VALUE_WIDTH_MAX = 60
+TIME = "time (UTC)"
+WIDE = 100
+"""Columns of a terminal from which there is room for the time of each value, beside whole names."""
 _TEXT_LONG = 24
 """A text of more characters explains something; values that change stand above it."""
 ROWS_MIN = 3
@@ -59,14 +62,14 @@ _MACHINE_FRAME_ROWS, _LEDGER_FRAME_ROWS, _NOTE_ROWS = 4, 7, 3
 
 
 def screen(
-    machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str, height: int | None = None
+    machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str, height: int | None = None, width: int = WIDE
 ) -> RenderableType:
-    """The whole view. height: rows of the terminal, in which the ledgers come before the last values of the machines"""
+    """The whole view, for a terminal of this size; in its height the ledgers come before the last values of the machines."""
     rows = None
     if height is not None and machines:
         taken = _NOTE_ROWS + (len(ledgers) + _LEDGER_FRAME_ROWS if ledgers else 0)
         rows = max(ROWS_MIN, (height - taken) // len(machines) - _MACHINE_FRAME_ROWS)
-    parts: list[RenderableType] = [_machine(machine, rows) for machine in machines]
+    parts: list[RenderableType] = [_machine(machine, rows, has_times=width >= WIDE) for machine in machines]
     if not machines:
         parts.append(Panel("waiting for a machine: no edge has announced one yet", title="no machine yet"))
     if ledgers:
@@ -92,7 +95,7 @@ class Cropped:
         for shown in lines[: room - 1]:
             yield from shown
             yield Segment.line()
-        rest = f"{len(lines) - room} more lines: enlarge the window, or name one machine (cnctwin watch MACHINE) · {self.note}"
+        rest = f"{len(lines) - room + 1} more lines: enlarge the window, or name one machine · {self.note}"
         yield Text(rest, style="dim", no_wrap=True, overflow="ellipsis")
 
 
@@ -136,9 +139,11 @@ def ledger_table(ledgers: Sequence[StageLedger], *, one_row: bool = False) -> Ta
     return table
 
 
-def _machine(machine: MachineView, rows_max: int | None) -> Panel:
+def _machine(machine: MachineView, rows_max: int | None, *, has_times: bool) -> Panel:
     table = Table(show_edge=False, expand=True)
-    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin, rules, alerts", 4), ("", 4)):
+    columns = (("measured", 3), ("", 4), (TIME, 2), ("twin and rules", 4), ("", 4))
+    narrow = (("measured", 5), ("", 4), ("twin and rules", 5), ("", 4))
+    for title, ratio in columns if has_times else narrow:
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
     measured, twin = _ordered(machine.measured, FIRST), _ordered(machine.twin, _TWIN_FIRST)
     rows = max(len(measured), len(twin))
@@ -149,7 +154,7 @@ def _machine(machine: MachineView, rows_max: int | None) -> Panel:
         table.add_row(
             Text(reading.name if reading else ""),
             _cell(reading),
-            _clock(reading),
+            *((_clock(reading),) if has_times else ()),
             Text(beside.name.removeprefix(twin_signals.TWIN_PREFIX) if beside else ""),
             _cell(beside),
         )

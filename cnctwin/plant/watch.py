@@ -62,7 +62,7 @@ def show(
             on_events(host.poll(0.1))
             if time.monotonic() - shown_s >= 0.25:
                 shown_s = time.monotonic()
-                view = screen(seen(), ledgers(host), note(), console.height)
+                view = screen(seen(), ledgers(host), note(), console.height, console.width)
                 live.update(Cropped(view, note()), refresh=True)
 
 

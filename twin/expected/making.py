@@ -35,8 +35,7 @@ from twin.optimisation.program import END_FACE_MM2
 from twin.programs import Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
-from twin.programs.fanuc.lathe import lathe_remarks
-from twin.programs.remarks import remarks
+from twin.programs.remarks import lathe_remarks, remarks
 from twin.programs.source import source_lines
 from twin.simulator.simulation import program_plan, program_settings
 

@@ -1,6 +1,6 @@
 """Remarks on a program that can be read, and that nobody meant so: it is cut off, or it cuts with the spindle at rest."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Container, Iterator, Sequence
 from typing import Final
 
 from twin.programs.canonical import Arc, Linear, Move, ProgramEnd, Spindle
@@ -70,3 +70,14 @@ def _place(dialect: Dialect, lines: list[str], at: int) -> str:
 
 def _shown(line: str) -> str:
     return repr(line if len(line) <= SHOWN_MAX else line[:SHOWN_MAX] + "…")
+
+
+def lathe_remarks(axes: Container[str]) -> tuple[str, ...]:
+    """Return what a person should know of a program for a machine with these axes, where they are those of a lathe.
+
+    >>> lathe_remarks("xyz"), len(lathe_remarks("xz"))
+    ((), 1)
+    """
+    if "y" in axes or "x" not in axes or "z" not in axes:
+        return ()
+    return ("the machine has no Y axis: its program is read as a mill's, so X is a radius, and G99 no feed per revolution",)

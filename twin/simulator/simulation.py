@@ -23,8 +23,7 @@ from twin.motion.sampling import sampled
 from twin.programs import FeedForward, Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
-from twin.programs.fanuc.lathe import lathe_remarks
-from twin.programs.remarks import remarks
+from twin.programs.remarks import lathe_remarks, remarks
 from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond

@@ -55,7 +55,9 @@ def doctor(
         if report.ledgers:
             console.print(ledger_table(report.ledgers))
             if any(UNMAPPED in ledger.reasons for ledger in report.ledgers):
-                console.print(f"{UNMAPPED}: values that the control offers and the edge's configuration gives no signal")
+                console.print(
+                    f"{UNMAPPED}: values of the control that the edge's configuration maps to no signal", soft_wrap=True
+                )
     if bundle is not None:
         from cnctwin.plant.bundle import summary, write_bundle
 

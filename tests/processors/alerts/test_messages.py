@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX
+from processors.alerts.messages import CLAIM, COMMAND, DELIVERY, OUTBOX
 from processors.alerts.report import STATE_TOPIC
 from tests.depth import examples
 from tests.processors.alerts.courier.alert_shop import DESK, Shop
@@ -69,6 +69,26 @@ def test_the_fate_of_a_notification_counts_once() -> None:
     shop.wait(2)
     assert shop.shown()["receivers"]["desk"]["failed"] == 1
     assert len(shop.shown()["failures"]) == 1
+
+
+def test_a_receiver_that_has_not_taken_a_notification_is_shown_until_it_has() -> None:
+    shop = Shop(delivers=False)
+    shop.set(vibration=True)
+    shop.wait(20)
+    (topic,) = outbox(shop)
+    key = topic.removeprefix(OUTBOX)
+    claim = {"id": key, "courier": "c", "phase": "waiting", "attempt": 1, "at": "", "receiver": "desk"}
+    shop.plain(CLAIM + key, json.dumps(claim | {"reason": "desk:9: connection refused"}))
+    shop.plain(CLAIM + key, json.dumps({"id": key, "courier": "c", "phase": "sending", "attempt": 2, "at": ""}))
+    shop.plain(CLAIM + "0123", json.dumps(claim | {"id": "0123", "reason": "another"}))
+    shop.wait(2)
+    assert shop.shown()["receivers"]["desk"]["last_error"] == (
+        "not taken yet (desk:9: connection refused); it will be tried again"
+    )
+    shop.plain(DELIVERY + key, json.dumps({"id": key, "receiver": "desk", "outcome": "delivered"}))
+    shop.wait(2)
+    desk = shop.shown()["receivers"]["desk"]
+    assert (desk["last_error"], desk["not_taken"], desk["delivered"], shop.shown()["malformed"]) == ("", "", 1, 0)
 
 
 def test_after_a_crash_the_same_decision_has_the_same_id() -> None:

@@ -16,7 +16,7 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.cnctwin.api.served_plant import PATIENCE_S, Stream, get, post, served
-from tests.cnctwin.api.small_plant import client_of, small_plant
+from tests.cnctwin.api.small_plant import birth, client_of, death, small_plant
 from tests.edge.host_watch import wait
 from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.until_stopped import until_stopped
@@ -141,4 +141,16 @@ def test_a_state_that_nobody_keeps_up_is_not_available() -> None:
     with client_of(live) as client:
         told = client.get("/alerts").json()
     assert told["available"] is False
-    assert "does not run any more" in told["reason"]
+    assert "nothing heard from the processor alerts since 2020-01-01 00:00:00 UTC" in told["reason"]
+
+
+def test_a_state_whose_processor_has_died_is_not_available_at_once() -> None:
+    live, node, at_ms = small_plant(), NodeId("cnc", "twin-alerts"), round(time.time() * 1000)
+    live.take_alerts({"at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "alerts": []})
+    live.take([birth({"health/lag_s": 0.0}, at_ms, node, None)], at_ms)
+    with client_of(live) as client:
+        assert client.get("/alerts").json()["available"] is True
+        live.take([death({"health/lag_s": 0.0}, at_ms + 1, node, None)], at_ms + 1)
+        told = client.get("/alerts").json()
+    assert told["available"] is False
+    assert told["reason"].endswith("is `cnctwin process alerts` running?")
