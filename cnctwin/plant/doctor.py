@@ -84,7 +84,8 @@ def in_sums(ledger: StageLedger) -> str:
     """
     unchanged = ledger.reasons.get(Drop.UNCHANGED, 0)
     repeats = f" + {unchanged} unchanged" if unchanged else ""
-    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {ledger.dropped - unchanged} dropped + {ledger.buffered} buffered"
+    others = f"{ledger.dropped - unchanged} dropped + {ledger.buffered} buffered"
+    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {others}"
 
 
 def counted_signals(measured: Mapping[str, Reading]) -> str:

@@ -131,15 +131,14 @@ def _machine(machine: MachineView, rows_max: int | None) -> Panel:
             _cell(beside),
         )
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
+    title = f"[bold]{escape(machine.name)}[/] {state}"
     hidden = max(len(measured) - shown, 0) + max(len(twin) - shown, 0)
     more = f"{hidden} more signals in a taller terminal" if hidden else None
-    return Panel(
-        table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left", subtitle=more, subtitle_align="right"
-    )
+    return Panel(table, title=title, title_align="left", subtitle=more, subtitle_align="right")
 
 
 def _ordered(readings: Mapping[str, Reading], first: Sequence[str]) -> list[Reading]:
-    """Return readings as a person looks for them: the most telling in their places, then the known, then those that explain; no JSON."""
+    """Return readings as a person looks for them: the most telling first, then known ones, then texts; no JSON."""
     rank = {name: place for place, name in enumerate(first)}
 
     def place(reading: Reading) -> tuple[int, bool, bool, str]:

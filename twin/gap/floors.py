@@ -274,8 +274,8 @@ def _origin(pairs: Sequence[_Pair]) -> str:
     """Say where the floors come from, where no run was repeated."""
     if not pairs:
         return (
-            "no run was repeated, and none goes through a motion twice: the repeatability is the noise of the sensors alone, so what "
-            "the machine does by chance counts as gap"
+            "no run was repeated, and none goes through a motion twice: the repeatability is the noise of the sensors alone, so "
+            "what the machine does by chance counts as gap"
         )
     laps = ", ".join(f"{len(pair.one) / pair.lag:.1f} of {pair.name}" for pair in pairs)
     return f"no run was repeated: the repeatability is what the laps of a run differ by ({laps})"

@@ -166,5 +166,5 @@ def test_one_slip_in_a_file_that_assumes_is_one_fault(slip: str) -> None:
 
 def test_an_assumption_of_what_the_file_does_not_state_is_a_fault() -> None:
     text = starter_text("five-axis", "vmc") + '\n[assumed."axes.q.mass_kg"]\nsource = "none"\n'
-    with pytest.raises(MachineError, match="axes.q.mass_kg is assumed, but the file does not state it"):
+    with pytest.raises(MachineError, match=r"axes\.q\.mass_kg is assumed, but the file does not state it"):
         machine_from_toml(text, "vmc.toml")

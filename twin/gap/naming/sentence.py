@@ -53,7 +53,8 @@ def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
     # a part that is compared alone may be far off where all that is compared as a whole is not
     gap = told.gap.before if told.gap.before > FAR else max([told.gap.before, *(s.explained.base.left.gap() for s in unknown)])
     place = f"in {where}" if where else _most(told.where)
-    return f"Unknown: a gap of {gap:.3g} × the repeatability{f' {place}' if place else ''} that no effect of the catalogue explains{partly}"
+    size = f"{gap:.3g} × the repeatability{f' {place}' if place else ''}"
+    return f"Unknown: a gap of {size} that no effect of the catalogue explains{partly}"
 
 
 def _most(cells: Sequence[Cell]) -> str:
