@@ -69,8 +69,8 @@ class HostApplication:
 
     With `keep_s` the broker keeps the session for so long, and what it delivers at QoS 1 until the application acknowledges it:
     `take_held` returns what `poll` has dealt with since it was last called, and `acknowledge` takes it. Nothing is dropped for
-    its age then, and a connection that ends makes nothing stale. `on_life` hears each birth and death. With `packs` data may
-    come packed (`HostEvent`).
+    its age then, and a connection that ends makes nothing stale. `on_life` hears each birth and death, `on_state` each STATE of
+    a host application that is subscribed to, with the id of that one. With `packs` data may come packed (`HostEvent`).
     """
 
     def __init__(
@@ -93,14 +93,13 @@ class HostApplication:
         keep_s: int = 0,
         packs: bool = False,
     ) -> None:
-        self.dropped = 0
-        self.faults = 0  # messages that a bug of ours has lost
+        self.dropped = self.faults = 0  # faults: messages that a bug of ours has lost
         self._queue_max = queue_max
         self._stale_s_max = math.inf if keep_s else stale_s_max
         self._keep_s = keep_s
         self.on_life: Callable[[Topic, bytes], None] | None = None
+        self.on_state: Callable[[str, bytes], None] | None = None
         self._held: list[Held] = []
-        self._is_lost = False  # the connection of a kept session
         self._wanted = wanted
         self._session = HostSession(
             host_id,
@@ -115,7 +114,7 @@ class HostApplication:
         )
         self._plain_filters: list[str] = []
         self._inbox: deque[tuple[str | _Mark | Overrun | Held, bytes, float]] = deque()  # with the time of time.monotonic
-        self._waits = False
+        self._is_lost = self._waits = False  # is_lost: the connection of a kept session
         self._filled = threading.Event()
         self._ticked_s = self._told_s = 0.0
         self._rates = Rates(limits, trusted)
@@ -320,6 +319,8 @@ class HostApplication:
                     events += session.message(topic, payload, now_ms())
                     if self.on_life is not None and ("BIRTH/" in topic or "DEATH/" in topic):
                         self.on_life(Topic.parse(topic), payload)
+                    elif self.on_state is not None and topic.startswith(STATE_PREFIX):
+                        self.on_state(topic.removeprefix(STATE_PREFIX), payload)
                 except Exception:
                     self._fail(f"a message on {shortened(topic)} could not be taken")
             elif isinstance(topic, Overrun):
@@ -363,7 +364,7 @@ class HostApplication:
         What the session counts as malformed is for it to count.
         """
         if topic.startswith(STATE_PREFIX):
-            return topic == self._session.state_topic
+            return topic == self._session.state_topic or self.on_state is not None
         try:
             verb, node, _ = Topic.parse(topic)
         except TopicError:

@@ -379,6 +379,8 @@ def read_machine(path: Path) -> MachineFile:
     """The machine in the file `path`. Raises MachineError where there is none or it does not describe a machine."""
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise MachineError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
         raise MachineError(f"{path}: cannot be read: {error}") from None
     return machine_from_toml(text, str(path))

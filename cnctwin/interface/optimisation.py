@@ -103,7 +103,7 @@ def optimise(
     """Optimise a part program on a machine.
 
     program: a Path is a file, a str the text itself; machine: as `read_machine` gives it, or the name of its file
-    force_limit_n: None = that of [limits]; probability: keep it with this probability, None = by the mean twin
+    force_limit_n: None = that of [limits]; probability: keep it with this probability, None = with the constants as stated
     speed_changes: where the spindle may change its speed; leave: lines (from 1) that stay as they are
     seed, evolutions, population, islands: of the search; resimulate: run both programs on the whole twin, too
     progress: is told the part that is done, 0 to 1, and what is being done

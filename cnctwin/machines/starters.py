@@ -1,6 +1,6 @@
 """Starter machines: a complete machine.toml for each class of machine, every figure of it assumed, with its range and source.
 
-A class is a file `classes/<class>.toml` beside this one, and is found by it.
+A class is a file `classes/<class>.toml` beside this one, and is found by it; as it stands, its machine has the name of the class.
 """
 
 import json
@@ -9,7 +9,6 @@ from pathlib import Path
 from cnctwin.errors import UsageError
 
 CLASSES = Path(__file__).with_name("classes")
-_NAME = 'name = "machine"'
 
 
 def machine_classes() -> tuple[str, ...]:
@@ -26,7 +25,7 @@ def starter_text(machine_class: str, machine: str) -> str:
     if machine_class not in machine_classes():
         raise UsageError(f"class {machine_class!r} is not known; there are {', '.join(machine_classes())}")
     text = (CLASSES / f"{machine_class}.toml").read_text(encoding="utf-8")
-    return text.replace(_NAME, f"name = {json.dumps(machine, ensure_ascii=False)}", 1)
+    return text.replace(f'name = "{machine_class}"', f"name = {json.dumps(machine, ensure_ascii=False)}", 1)
 
 
 def title_of(machine_class: str) -> str:

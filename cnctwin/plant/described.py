@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from cnctwin.plant.descriptions import Known, LiveDescriptions
+from cnctwin.plant.finding import Finding
 from processors.description import Role
 from twin.assumed import listed
 from twin.live.assumed import completed
@@ -70,26 +71,28 @@ def assumptions(machine: MachineFile) -> tuple[str, ...]:
     return machine.machine.assumed
 
 
-def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[tuple[bool, str]]:
-    """Return a sentence on each thing there is to say of a machine's description, and whether it is good."""
+def sentences(found: DescribedMachine, store: str = "STORE") -> Iterator[Finding]:
+    """Return a finding on each thing there is to say of a machine's description."""
     name = found.machine
     typed = shlex.quote(name)
     fit = f"`cnctwin identify --store {shlex.quote(store)} --machine {typed} --out {shlex.quote(f'{name}.toml')}` fits"
     if found.assumed is None:
-        yield True, f"{name}: not described, so its constants are assumed; write machines/{name}.toml, or {fit} one"
+        text = f"{name}: not described, so its constants are assumed; write machines/{name}.toml, or {fit} one"
+        yield Finding(True, text, note=True)
     else:
         how = " ".join(filter(None, (found.step, f"by {found.by}" if found.by else "")))
         said = ": ".join(filter(None, (how, found.why)))
-        yield True, f"{name}: description {found.version} is live{_since(found.since_ms)}{f', {said}' if said else ''}"
+        yield Finding(True, f"{name}: description {found.version} is live{_since(found.since_ms)}{f', {said}' if said else ''}")
         if found.assumed:
             verb, them = ("is", "it") if len(found.assumed) == 1 else ("are", "them")
-            yield True, f"{name}: {listed(found.assumed)} {verb} assumed; {fit} {them}"
+            yield Finding(True, f"{name}: {listed(found.assumed)} {verb} assumed; {fit} {them}", note=True)
     if found.challenger:
         why = f": {found.challenger_why}" if found.challenger_why else ""
         waits = f"challenger {found.challenger} waits{_since(found.challenger_since_ms)}{why}"
-        yield True, f"{name}: {waits}; `cnctwin twin show {typed}` weighs it, `cnctwin twin promote {typed}` makes it live"
+        way = f"`cnctwin twin show {typed}` weighs it, `cnctwin twin promote {typed}` makes it live"
+        yield Finding(True, f"{name}: {waits}; {way}", note=True)
     for fault in found.faults:
-        yield False, f"{name}: {fault}"
+        yield Finding(False, f"{name}: {fault}")
 
 
 def _since(at_ms: int) -> str:

@@ -7,6 +7,8 @@ from typing import Any
 
 from cnctwin.plant.described import DescribedMachine, described_machines, sentences
 from cnctwin.plant.descriptions import LiveDescriptions
+from cnctwin.plant.finding import Finding
+from cnctwin.plant.gone import FILTERS, LastWords
 from cnctwin.plant.lags import lag_reports
 from cnctwin.plant.on_log import FirstLook, of_log
 from cnctwin.plant.quarantine import refused_lines
@@ -20,22 +22,19 @@ from sparkplug.host import EventKind, HostApplication
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary.nodes import VALIDATION_NODE
+from twin.vocabulary.signals import ADDED
 
 _SLOPPY = {
     "sloppy_births": "births left out what Sparkplug demands (bdSeq, Node Control/Rebirth, a time stamp)",
     "sloppy_sequence": "messages came with a wrong sequence number",
     "sloppy_aliases": "aliases stood for a metric of a node and one of its device (as Tahu Java gives them)",
 }
+_COUNTED = {
+    "holes": ("gap in the data", "gaps in the data"),
+    "dead_letters": ("message that could not be used (dead letter)", "messages that could not be used (dead letters)"),
+}
 NAMED_MAX = 8
 COME_AND_GO = (VALIDATION_NODE,)  # nodes that tell what they have found, and end
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was looked at."""
-
-    good: bool
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +59,10 @@ class Report:
 
 def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
     """Listen to a broker for a while and report; asks nodes for their births where it has to."""
-    host, descriptions, first = viewer(broker, group), LiveDescriptions(), FirstLook()
-    for topic in descriptions.filters:
+    host, descriptions, first, last = viewer(broker, group), LiveDescriptions(), FirstLook(), LastWords()
+    for topic in (*descriptions.filters, *FILTERS):
         host.subscribe_plain(topic)
+    host.on_state = last.take_state
     host.start()
     try:
         deadline_s = time.monotonic() + seconds
@@ -70,8 +70,9 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
             for event in host.poll(0.1):
                 if event.kind is EventKind.PLAIN:
                     descriptions.take(event.topic, event.payload)
+                    last.take(event.topic, event.payload)
             first.take(host)
-        return diagnose(host, broker.url, descriptions, first)
+        return diagnose(host, broker.url, descriptions, first, last)
     finally:
         host.stop()
 
@@ -84,8 +85,8 @@ def in_sums(ledger: StageLedger) -> str:
     """
     unchanged = ledger.reasons.get(Drop.UNCHANGED, 0)
     repeats = f" + {unchanged} unchanged" if unchanged else ""
-    others = f"{ledger.dropped - unchanged} dropped + {ledger.buffered} buffered"
-    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {others}"
+    dropped = ledger.dropped - unchanged
+    return f"{ledger.received} = {ledger.emitted} emitted{repeats} + {dropped} dropped + {ledger.buffered} buffered"
 
 
 def counted_signals(measured: Mapping[str, Reading]) -> str:
@@ -94,14 +95,21 @@ def counted_signals(measured: Mapping[str, Reading]) -> str:
     >>> fine = Reading("program", "O1", 1, Quality.GOOD, None, None, False)
     >>> counted_signals({"program": fine, "alarm": fine._replace(value=None, quality=Quality.BAD)})
     '2 signals, 1 not good: alarm'
+    >>> counted_signals({"program": fine, "stamp_clock": fine})
+    '2 signals (1 added by the edge), 0 not good'
     """
     bad = [name for name, reading in measured.items() if reading.quality is not Quality.GOOD]
     named = f": {', '.join(bad[:NAMED_MAX])}{', …' if len(bad) > NAMED_MAX else ''}" if bad else ""
-    return f"{len(measured)} signals, {len(bad)} not good{named}"
+    added = len(ADDED & measured.keys())
+    signals = f"{len(measured)} signal{'' if len(measured) == 1 else 's'}{f' ({added} added by the edge)' if added else ''}"
+    return f"{signals}, {len(bad)} not good{named}"
 
 
-def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook) -> Report:
-    """Return what a host application that has listened for a while can say; `first`: how nodes were when it began."""
+def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook, last: LastWords) -> Report:
+    """Return what a host application that has listened for a while can say.
+
+    first: how nodes were when it began; last: what processors have left behind
+    """
     if not host.online:
         return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
     findings = [Finding(True, f"{url} answers")]
@@ -115,11 +123,12 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
             findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
     if not host.nodes():
         findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
+    findings += [Finding(False, sentence) for sentence in last.gone(host)]
     for machine in machines(host):
         state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
         findings.append(Finding(machine.online, f"{machine.name}: {state}; {counted_signals(machine.measured)}"))
     described = described_machines(descriptions, [machine.name for machine in machines(host)])
-    findings += [Finding(good, text) for one in described for good, text in sentences(one)]
+    findings += [said for one in described for said in sentences(one)]
     for ledger in stages:
         sums = in_sums(ledger)
         findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
@@ -128,10 +137,7 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
         if connected is not None and connected.value is False:
             reason = f": {why.value}" if why is not None and isinstance(why.value, str) and why.value else ""
             findings.append(Finding(False, f"{node_id} has no control{reason}"))
-        for name in ("holes", "dead_letters"):
-            count = metrics[name].value if name in metrics else 0
-            if isinstance(count, int) and count:
-                findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
+        findings += of_counts(node_id, metrics)
         findings += of_store(node_id, metrics)
         findings += of_edge_store(node_id, metrics)
         findings += of_awaited(node_id, metrics)
@@ -149,9 +155,23 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, fi
     return Report(tuple(findings), tuple(stages), described)
 
 
+def of_counts(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return a note on each kind of thing that a node has counted, and that is no fault of the plant as it is now."""
+    found = []
+    for name, (one, many) in _COUNTED.items():
+        count = metrics[name].value if name in metrics else 0
+        if isinstance(count, int) and count:
+            found.append(Finding(True, f"{node_id}: {count} {one if count == 1 else many} so far", note=True))
+    return found
+
+
 def of_sloppy_peers(counts: Mapping[str, int]) -> list[Finding]:
     """Return a finding for each rule of Sparkplug that a peer has not kept; what it sent is read all the same."""
-    return [Finding(True, f"{counts[name]} {what}; read all the same") for name, what in _SLOPPY.items() if counts.get(name)]
+    return [
+        Finding(True, f"{counts[name]} {what}; read all the same", note=True)
+        for name, what in _SLOPPY.items()
+        if counts.get(name)
+    ]
 
 
 def of_lags(reports: Sequence[LagReport]) -> list[Finding]:
@@ -188,7 +208,8 @@ def of_history(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
     """Return the finding that edges have heard of no historian; nothing where each has."""
     without = sum(metrics["history"].value == NO_HISTORIAN for metrics in every if "history" in metrics)
     how = "start `cnctwin process historian` to keep it"
-    return [Finding(True, f"{without} edge{'s' if without > 1 else ''}: {NO_HISTORIAN}; {how}")] if without else []
+    text = f"{without} edge{'s' if without > 1 else ''}: {NO_HISTORIAN}; {how}"
+    return [Finding(True, text, note=True)] if without else []
 
 
 def of_sequence_holes(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
@@ -203,7 +224,8 @@ def of_faults(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
     if not isinstance(faults, int) or not faults:
         return []
     times = f", restarted {restarts!s} times" if restarts else ""
-    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last!s}")]
+    contained = "1 fault" if faults == 1 else f"{faults} faults"
+    return [Finding(True, f"{node_id}: {contained} contained{times}; the last: {last!s}", note=True)]
 
 
 def of_overload(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:

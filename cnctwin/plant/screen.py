@@ -5,11 +5,13 @@ Whatever comes from the broker is shown as it is: a bracket in a name is a brack
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.markup import escape
 from rich.panel import Panel
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -73,6 +75,27 @@ def screen(
     return Group(*parts)
 
 
+@dataclass(frozen=True, slots=True)
+class Cropped:
+    """A view cut to the height of the terminal; its last line then says how to see the rest."""
+
+    whole: RenderableType
+    note: str
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield what there is room for."""
+        lines = console.render_lines(self.whole, options, pad=False)
+        room = console.height - 1
+        if len(lines) <= room:
+            yield self.whole
+            return
+        for shown in lines[: room - 1]:
+            yield from shown
+            yield Segment.line()
+        rest = f"{len(lines) - room} more lines: enlarge the window, or name one machine (cnctwin watch MACHINE) · {self.note}"
+        yield Text(rest, style="dim", no_wrap=True, overflow="ellipsis")
+
+
 def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str:
     """One line for a place that is no terminal."""
     if not machines:
@@ -115,7 +138,7 @@ def ledger_table(ledgers: Sequence[StageLedger], *, one_row: bool = False) -> Ta
 
 def _machine(machine: MachineView, rows_max: int | None) -> Panel:
     table = Table(show_edge=False, expand=True)
-    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin", 4), ("", 4)):
+    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin, rules, alerts", 4), ("", 4)):
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
     measured, twin = _ordered(machine.measured, FIRST), _ordered(machine.twin, _TWIN_FIRST)
     rows = max(len(measured), len(twin))
@@ -131,14 +154,15 @@ def _machine(machine: MachineView, rows_max: int | None) -> Panel:
             _cell(beside),
         )
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
-    title = f"[bold]{escape(machine.name)}[/] {state}"
     hidden = max(len(measured) - shown, 0) + max(len(twin) - shown, 0)
     more = f"{hidden} more signals in a taller terminal" if hidden else None
-    return Panel(table, title=title, title_align="left", subtitle=more, subtitle_align="right")
+    return Panel(
+        table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left", subtitle=more, subtitle_align="right"
+    )
 
 
 def _ordered(readings: Mapping[str, Reading], first: Sequence[str]) -> list[Reading]:
-    """Return readings as a person looks for them: the most telling first, then known ones, then texts; no JSON."""
+    """Return readings as a person looks for them: the most telling first, then the known, then those that explain; no JSON."""
     rank = {name: place for place, name in enumerate(first)}
 
     def place(reading: Reading) -> tuple[int, bool, bool, str]:

@@ -9,7 +9,7 @@ from uuid import uuid4
 from rich.console import Console
 from rich.live import Live
 
-from cnctwin.plant.screen import line, screen
+from cnctwin.plant.screen import Cropped, line, screen
 from cnctwin.plant.view import MachineView, ledgers, machines
 from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
@@ -62,7 +62,8 @@ def show(
             on_events(host.poll(0.1))
             if time.monotonic() - shown_s >= 0.25:
                 shown_s = time.monotonic()
-                live.update(screen(seen(), ledgers(host), note(), console.height), refresh=True)
+                view = screen(seen(), ledgers(host), note(), console.height)
+                live.update(Cropped(view, note()), refresh=True)
 
 
 def watch(broker: BrokerAddress, group: str, machine: str | None, stop: Event) -> None:

@@ -114,7 +114,7 @@ def new_courier(
     if not config.receivers:
         return None
     if broker is None:
-        raise ConfigurationError("alerts: the courier reads from the broker what is to be sent; give --broker or CNCTWIN_BROKER")
+        raise ConfigurationError("alerts: notifications are sent by way of the broker; give --broker or CNCTWIN_BROKER")
     from processors.alerts.courier.thread import Courier  # noqa: PLC0415
 
     return lambda: Courier(broker, config, group, member)

@@ -1,7 +1,7 @@
 """The receiver of alerts that an answer names: its table in processors.toml, and the secrets that the table only names.
 
 pushover            a phone, by Pushover: PUSHOVER_TOKEN, PUSHOVER_USER
-https://…           a webhook; the address often holds a secret, so it is one: CNCTWIN_ALERTS_URL
+https://…           a webhook (on this computer http:// too); the address often holds a secret, so it is one: CNCTWIN_ALERTS_URL
 slack://…, …        whatever Apprise speaks; the address holds the secret: CNCTWIN_ALERTS_URL
 """
 
@@ -26,7 +26,9 @@ def kind_of(answer: str) -> str:
         return "pushover"
     scheme, found, _ = answer.partition("://")
     if not found or not scheme:
-        raise UsageError("alerts go to pushover, to an https:// address, to an address of Apprise, or to none")
+        raise UsageError(
+            "alerts go to pushover, to an https:// address (or http:// on this computer), to an address of Apprise, or to none"
+        )
     return "webhook" if scheme in ("http", "https") else "apprise"
 
 

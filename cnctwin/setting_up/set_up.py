@@ -190,7 +190,7 @@ class SetUp:
         before = text_of(file)
         text = before or PROCESSORS
         now = KEEP if f"[alerts.receivers.{receiver.NAME}]" in text else NONE
-        question = "Alerts go to (pushover, an https:// address, an address of Apprise such as mailto://…, or none)"
+        question = "Alerts go to (pushover, https://…, http://localhost…, an address of Apprise such as mailto://…, or none)"
         self.texts[file] = self._answered(
             question, now, "--alerts", self.answers.alerts, lambda answer: self._receiving(text, answer)
         )

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from processors.alerts.body import TEST, Notice
 from processors.alerts.notification import Name, Notification
-from processors.alerts.outbox import made, recalled, settled
+from processors.alerts.outbox import made, postponed, recalled, settled
 from processors.alerts.state import (
     OUTCOMES_MAX,
     SILENCES_MAX,
@@ -32,7 +32,7 @@ from processors.alerts.words.wordings import Alerts, wording_of
 from twin.vocabulary import topics
 
 TOPIC = topics.ALERTS
-COMMAND, DELIVERY, OUTBOX = topics.ALERT_COMMAND, topics.ALERT_DELIVERY, topics.ALERT_OUTBOX
+COMMAND, DELIVERY, OUTBOX, CLAIM = topics.ALERT_COMMAND, topics.ALERT_DELIVERY, topics.ALERT_OUTBOX, topics.ALERT_CLAIM
 MESSAGE_BYTES_MAX = 4096
 OUTBOX_BYTES_MAX = 200_000
 SILENCE_S_MAX = 30 * 86_400.0
@@ -89,6 +89,14 @@ class Delivery(_Message):
     reason: Comment = ""
 
 
+class Claim(_Message):
+    """A sender's claim on a notification; with a reason, the receiver has surely not taken it and it is tried again."""
+
+    id: Name
+    receiver: Name = "?"
+    reason: Comment = ""
+
+
 def taken(configuration: Alerts, state: AlertsState, topic: str, text: str) -> AlertsState:
     """The state after a message."""
     size_max = OUTBOX_BYTES_MAX if topic.startswith(OUTBOX) else MESSAGE_BYTES_MAX
@@ -100,6 +108,8 @@ def taken(configuration: Alerts, state: AlertsState, topic: str, text: str) -> A
         document = json.loads(text)
         if topic.startswith(COMMAND):
             return _command(configuration, state, topic.removeprefix(COMMAND), document)
+        if topic.startswith(CLAIM):
+            return _claimed(state, Claim.model_validate(document))
         if topic.startswith(DELIVERY):
             return _delivered(state, Delivery.model_validate(document))
     except ValidationError as error:
@@ -144,7 +154,7 @@ def _ack(_: Alerts, state: AlertsState, command: Ack) -> Done:
     if command.episode not in (0, alert.episode):
         return state, False, f"{alert.name} on {alert.machine}: that episode is over, another one fires"
     if alert.phase is Phase.ACKNOWLEDGED:
-        return state, True, f"{alert.name} on {alert.machine} was acknowledged by {alert.acknowledged_by} before"
+        return state, True, f"{alert.name} on {alert.machine} is already acknowledged by {alert.acknowledged_by}"
     acknowledged = replace(
         alert,
         phase=Phase.ACKNOWLEDGED,
@@ -192,6 +202,10 @@ _COMMANDS: dict[str, tuple[type[Command], Callable[..., Done]]] = {
 
 
 # The fate of notifications.
+
+
+def _claimed(state: AlertsState, claim: Claim) -> AlertsState:
+    return postponed(state, claim.id, claim.receiver, claim.reason) if claim.reason else state
 
 
 def _delivered(state: AlertsState, delivery: Delivery) -> AlertsState:

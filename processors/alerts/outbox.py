@@ -67,7 +67,7 @@ def emitted(state: AlertsState) -> tuple[AlertsState, list[PlainOutput]]:
     clock_s = state.clock_s
     for key, item in state.outbox.items():
         if clock_s > item.expires_s + CLEAR_AFTER_S:
-            state = settled(state, key, item.receiver, FAILED, "no courier said what became of it; it may have arrived")
+            state = settled(state, key, item.receiver, FAILED, "what became of it was not reported; it may have arrived")
     outputs = []
     outbox: dict[str, Item] = {}
     for key, item in state.outbox.items():
@@ -88,7 +88,7 @@ def settled(state: AlertsState, key: str, receiver: str, outcome: str, reason: s
     if key in state.settled or len(state.settled) >= SETTLED_MAX:
         return state
     item = state.outbox.get(key)
-    known = state.receivers.get(receiver, ReceiverState())
+    known = replace(state.receivers.get(receiver, ReceiverState()), not_taken="")
     if outcome == DELIVERED:
         known = replace(known, delivered=known.delivered + 1, last_delivered_wall_s=state.wall_s)
     else:
@@ -105,6 +105,15 @@ def settled(state: AlertsState, key: str, receiver: str, outcome: str, reason: s
         settled=state.settled | {key: Settled(receiver, outcome, reason, state.clock_s)},
         receivers=state.receivers | {receiver: known},
     )
+
+
+def postponed(state: AlertsState, key: str, receiver: str, reason: str) -> AlertsState:
+    """The receiver surely has not taken a notification, for this reason; it is tried again."""
+    item = state.outbox.get(key)
+    if item is None or item.receiver != receiver:
+        return state
+    known = replace(state.receivers.get(receiver, ReceiverState()), not_taken=reason)
+    return replace(state, receivers=state.receivers | {receiver: known})
 
 
 def recalled(state: AlertsState, found: Notification, payload: str) -> AlertsState:

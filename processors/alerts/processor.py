@@ -1,8 +1,9 @@
 """Alerts: from alarm signals of all machines to notifications, once each, for people who are to keep them switched on.
 
-A pure fold over all machines. Once a second (a beat of the wall clock) each alarm is looked at, each alert goes a step
-(`phases.py`), and what each receiver has to be told (`notices.py`) goes into the outbox (`outbox.py`), a retained message for
-each notification, which the courier (`courier/`) sends. What became of it comes back; only then is it cleared.
+Its state follows from the messages of all machines alone. Once a second (a beat of the wall clock) each alarm is looked at, each
+alert goes a step (`phases.py`), and what each receiver has to be told (`notices.py`) goes into the outbox (`outbox.py`), a
+retained message for each notification, which the courier (`courier/`) sends. What became of it comes back; only then is it
+cleared.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from processors.alarms import alarm_signals
 from processors.alerts import lag
 from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
-from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX, TOPIC, taken
+from processors.alerts.messages import CLAIM, COMMAND, DELIVERY, OUTBOX, TOPIC, taken
 from processors.alerts.notices import notified
 from processors.alerts.outbox import emitted, made
 from processors.alerts.report import FIRING, STATE, SUMMARY, machine_outputs, state_output
@@ -108,6 +109,6 @@ PROCESSOR = CellProcessor(
     initial=lambda _: AlertsState(),
     step=step,
     reads=read_wordings,
-    listens=(f"{COMMAND}#", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
+    listens=(f"{COMMAND}#", f"{CLAIM}+", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
     beats=True,
 )

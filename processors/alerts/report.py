@@ -139,7 +139,8 @@ def _receiver(known: ReceiverState, waiting: int) -> dict[str, Any]:
         "waiting": waiting,
         "held_back": known.held_back,
         "muted": known.is_muted,
-        "last_error": known.last_error,
+        "last_error": f"not taken yet ({known.not_taken}); it will be tried again" if known.not_taken else known.last_error,
+        "not_taken": known.not_taken,
         "last_delivered": _wall(known.last_delivered_wall_s) if known.last_delivered_wall_s else None,
     }
 

@@ -113,7 +113,8 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class ReceiverState:
-    """One receiver and how it fares. `recent_s` and `recent_high_s`: notifications of the last hour, by clock_s."""
+    """One receiver and how it fares. `recent_s` and `recent_high_s`: notifications of the last hour, by clock_s; `not_taken`: why
+    the one that is being tried again was not taken; "" where none is."""
 
     told: dict[str, LastNotice] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
@@ -125,6 +126,7 @@ class ReceiverState:
     delivered: int = 0
     failed: int = 0
     last_error: str = ""
+    not_taken: str = ""
     last_delivered_wall_s: float = 0.0
 
 
@@ -221,7 +223,7 @@ class AlertsState:
 
 
 def fingerprint(labels: dict[str, str]) -> str:
-    """Return the identity of an alert: its labels, severity left out, since that may rise.
+    """Return the identity of an alert: its labels without the severity, which may rise.
 
     >>> fingerprint({"alertname": "rule_vibration", "machine": "okuma"})
     'ea33a6c7165f5dfa'

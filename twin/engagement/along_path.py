@@ -50,6 +50,12 @@ class PathRows:
     end_face_mm2: Floats
     collisions: tuple[Collision, ...]
 
+    def lines_met(self, path: Path) -> frozenset[int]:
+        """The lines of the path that feed into material, by the side of the tool or by its end."""
+        inside = (self.axial_depth_mm > 0.0) | (self.end_face_mm2 > 0.0)
+        met = self.segment[inside & (path.kind[self.segment] != Kind.RAPID)]
+        return frozenset(path.line[met].tolist())
+
     def row_at(self, segment: Ints, part: Floats) -> Ints:
         """The row at that part (0 … 1) of each segment."""
         count = self.first[segment + 1] - self.first[segment]

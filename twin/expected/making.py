@@ -35,6 +35,7 @@ from twin.optimisation.program import END_FACE_MM2
 from twin.programs import Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
+from twin.programs.fanuc.lathe import lathe_remarks
 from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 from twin.simulator.simulation import program_plan, program_settings
@@ -76,10 +77,11 @@ def expectation_of(
     source, block_number = source_lines(program_text), dialect.words.block_number
     numbering = numbering_of(source, block_number) if numbering is None else numbering
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
-    notes = [*remarks(dialect, program_text, own)]
+    notes: list[str] = [*lathe_remarks(machine.axes)]
     plan = program_plan(machine, path, notes)
     missing = Missing()
     given = _Given.of(machine, path, plan, notes, missing)
+    notes = [*remarks(dialect, program_text, own, None if given.rows is None else given.rows.lines_met(path)), *notes]
     told = [*numbers(source, numbering, block_number), OUTSIDE]
     runs = tuple(given.runs(told))
     meter = None

@@ -34,6 +34,7 @@ TEMPERATURE = "spindle_temp_c"
 UNDRIVEN_S = 60.0
 """Time for which what heats the spindle may be unknown without being mentioned."""
 HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+RUNS_NAMED = 4
 SHORT = 0.5
 """Part of R·C below which a run of the heat is short."""
 NEARLY_K = 4.0
@@ -58,7 +59,7 @@ def inspected(case: Case) -> tuple[Case, tuple[str, ...]]:
         raise CaseError(f"{case.name}: no run can be compared with the machine: {(*notes, f'there are {there}')[0]}")
     if not looked.of(role="check"):
         notes.append("no run of role check: this is judged on the runs that were fitted, which flatters")
-    return looked, tuple(notes)
+    return looked, _said_once(notes)
 
 
 def slow_effects(case: Case) -> frozenset[str]:
@@ -83,6 +84,24 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
 def _alone(log: RunLog, letter: str) -> bool:
     """Return True where a part of an axis can be compared without its reference: its mechanics, or its table."""
     return log.has(f"{letter}_pos_mm") and any(log.has(f"{letter}_{answer}") for answer in ("torque_a", "table_mm"))
+
+
+def _said_once(notes: Iterable[str]) -> tuple[str, ...]:
+    """Return notes that say the same of several runs as one, with the names of the runs.
+
+    >>> _said_once(["runs/a: is short", "runs/b: is short", "no run of role check", "runs/c: is short"])
+    ('runs/a, runs/b, runs/c: is short', 'no run of role check')
+    """
+    runs: dict[str, list[str]] = {}
+    for note in notes:
+        name, colon, said = note.partition(": ")
+        runs.setdefault(said if colon else note, []).extend([name] if colon else [])
+    return tuple(f"{_listed(names)}: {said}" if names else said for said, names in runs.items())
+
+
+def _listed(names: list[str]) -> str:
+    more = [f"{len(names) - RUNS_NAMED} more"] if len(names) > RUNS_NAMED else []
+    return ", ".join([*names[:RUNS_NAMED], *more])
 
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:

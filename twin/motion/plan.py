@@ -61,6 +61,11 @@ class Plan:
         each = np.concatenate([self.duration_s, self.wait_s, self.halt_s, self.event_duration_s])
         return np.asarray(np.bincount(lines, each), dtype=np.float64)
 
+    def waits_by_line(self) -> Floats:
+        """Seconds (highest line + 1,) that the axes stand for the spindle before each source line; part of `seconds_by_line`."""
+        first_line = self.path.line[self.stretches.first[:-1]]
+        return np.asarray(np.bincount(first_line, self.wait_s), dtype=np.float64)
+
 
 def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:
     """The plan of `path` under the limits `times`. Overrides act on the programmed feed and the rapid rate, on no other limit.

@@ -337,6 +337,15 @@ def _room(one: Allowed, rpm: Floats) -> Floats:
     return np.asarray((one.feed_max(rpm[:, None]) - one.feed_min(rpm[:, None]))[:, 0])
 
 
+def check_tools(machine: MachineFile) -> None:
+    """Raises MachineError where no tool is described, before anything else that is missing: nothing else would help."""
+    if machine.tool is None and not machine.tools:
+        raise MachineError(
+            "no [tool]: no force is computed, so that there is nothing to choose; describe the end mill in [tool] or [tools.N] "
+            "(turning has no model of force)"
+        )
+
+
 def limits_of(machine: MachineFile, force_limit_n: float | None) -> Limits:
     """[limits] of a machine, with the force limit that was asked for. Raises MachineError where there is none."""
     if machine.limits is None:

@@ -1,5 +1,6 @@
 """The answer of the optimiser: the program rewritten, each line before and after, what binds, how far the optimum is."""
 
+import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -42,6 +43,8 @@ class Binds(StrEnum):
     """Another speed would be better for this line, but not for all lines that have to have the same one."""
     DYNAMICS = "axis dynamics"
     """The line is too short to reach its feed."""
+    RUN_UP = "spindle run-up"
+    """The line waits for the spindle to reach its speed; a lower one is reached sooner."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,11 +145,13 @@ class Parted:
 class Sensitivity:
     """The effect of the twin's uncertainty on the force limit.
 
-    kept: probability that no line exceeds the limit, 0 to 1; asked: that which was asked for, None = planned by the mean twin
+    kept: probability that no line exceeds the limit, 0 to 1; asked: that which was asked for, None = planned with the constants
+        as stated
     draws: on how many draws of the constants `kept` stands, other ones than those that the plan was made with
     force_low_n, force_high_n: 90 % interval of the greatest force
-    price_pct: by how many per cent the objective is (or would be) worse if the limit is kept with `priced` instead of by the mean
-    parts: largest first; source: where the intervals come from, a sentence
+    price_pct: by how many per cent the objective is (or would be) worse if the limit is kept with `priced` instead of with the
+        constants as stated
+    parts: largest first; source: where the intervals come from, a sentence; identified: one of them was identified
     """
 
     kept: float
@@ -158,6 +163,13 @@ class Sensitivity:
     price_pct: float
     parts: tuple[Parted, ...]
     source: str
+    identified: bool = True
+
+    @property
+    def is_unsure(self) -> bool:
+        """Return True where the limit is kept less surely than with `priced`, beyond what so many draws can tell."""
+        off = math.sqrt(max(self.kept * (1.0 - self.kept), 0.0) / max(self.draws, 1))
+        return self.kept + 2.0 * off < self.priced
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,37 +3,39 @@
 import difflib
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
-from twin.errors import OptimisationError
 from twin.machine import Limits
 from twin.motion.path import Path
 from twin.optimisation.allowed import limits_of
-from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
+from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Sensitivity, Totals
 from twin.optimisation.bound import bound_of
 from twin.optimisation.forces import CutForces
 from twin.optimisation.learned_forces import learned_notes
-from twin.optimisation.margin import margin
+from twin.optimisation.price import Least, price_pct
 from twin.optimisation.problem import Problem
 from twin.optimisation.program import FeedLine
-from twin.optimisation.question import Question, problem, single
+from twin.optimisation.question import Question, single
 from twin.optimisation.reasons import what_binds
 from twin.optimisation.rewriting import Rewritten
-from twin.optimisation.seeds import by_itself, closed_form
+from twin.optimisation.seeds import by_itself
 from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, shown_lines, totals
 from twin.optimisation.speeds.notes import speed_notes
 from twin.optimisation.speeds.stretches import changes_in_material
-from twin.optimisation.uncertainty import PRICED, sensitivity
+from twin.optimisation.uncertainty import sensitivity
 from twin.programs.source import source_lines
 
 LINES_SHOWN = 5
 
 
 def answered(
-    question: Question, made: Problem, text: Rewritten, how: Search, front: tuple[FrontPoint, ...], again: Resimulated | None
-) -> Optimised:
+    question: Question, made: Problem, text: Rewritten, how: Search, front: tuple[FrontPoint, ...], again: Resimulated | None,
+    least: Least,
+) -> Optimised:  # fmt: skip
     """The answer: both programs as they are cut, and what is known of the difference.
 
     text: the rewritten program; how: the search; front: empty where one objective was asked for; again: of the whole machine
+    least: a search for another question, by which the probability of the force limit gets its price
     """
     machine, forces, alone = made.program.machine, CutForces.of(made.program), single(question.objective)
     limits = limits_of(machine, question.force_limit_n)
@@ -45,14 +47,18 @@ def answered(
     known = None
     if limits.force_n is not None:
         advance = advance_of_cuts(made, text.path)
-        known = sensitivity(forces, advance, machine, limits.force_n, question.probability, _price(question), question.seed)
+        known = sensitivity(forces, advance, machine, limits.force_n, question.probability, question.seed)
+        if known is not None:
+            known = replace(
+                known, price_pct=price_pct(question, min((point.cost for point in front), default=value), known, least)
+            )
     old, new = source_lines(made.program.text), source_lines(text.text)
     return Optimised(
         name=question.name,
         machine=machine.machine.name,
         objective=question.objective,
         currency=made.economy.currency if made.economy is not None else "",
-        sentence=_sentence(question, made, figures, bound, limits),
+        sentence=_sentence(question, made, figures, bound, limits, known),
         limits=limits_shown(made, limits),
         before=figures[0],
         after=figures[1],
@@ -92,21 +98,6 @@ def _totals(made: Problem, shown: ShownLines, path: Path, limits: Limits) -> Tot
     return totals(shown, seconds, cost if made.economy is not None else None, limits, made)
 
 
-def _price(question: Question) -> float:
-    """By how many per cent the objective is worse if the limit is kept with a probability, by the closed form."""
-    values = []
-    for asked in (None, question.probability or PRICED):
-        try:
-            one = question.with_(probability=asked, margin=1.0)
-            made = problem(one.with_(margin=margin(one)))
-        except OptimisationError:
-            return float("inf")
-        feed, rpm = closed_form(made, single(question.objective))
-        seconds, cost = made.evaluate_words(feed[None], rpm[None])
-        values.append(float((seconds if question.objective is Objective.TIME else cost)[0]))
-    return max(100.0 * (values[1] / values[0] - 1.0), 0.0)
-
-
 def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten, objective: Objective) -> tuple[LineAnswer, ...]:
     old, new = source_lines(made.program.text), source_lines(text.text)
     rows = {int(k): row for row, k in enumerate(made.allowed.index)}
@@ -126,7 +117,9 @@ def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten
                 axial_depth_mm=deepest,
                 before=before.line(k),
                 after=after.line(k),
-                binds="" if row is None else what_binds(made, row, after.line(k), objective, float(rpm[row])),
+                binds=""
+                if row is None
+                else what_binds(made, row, after.line(k), float(after.waits_s[k]), objective, float(rpm[row])),
                 bound=None if row is None else (float(feed[row]), float(rpm[row])),
                 left_alone=line.left_alone,
                 force_known=not line.plunges,
@@ -135,7 +128,9 @@ def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten
     return tuple(answers)
 
 
-def _sentence(question: Question, made: Problem, figures: list[Totals], bound: Bound, limits: Limits) -> str:
+def _sentence(
+    question: Question, made: Problem, figures: list[Totals], bound: Bound, limits: Limits, known: Sensitivity | None
+) -> str:
     before, after = figures
 
     def change(old: float, new: float) -> str:
@@ -150,7 +145,7 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     if before.cost is not None and after.cost is not None and made.economy is not None:
         parts.append(f"{before.cost:.4g} to {after.cost:.4g} {made.economy.currency} ({change(before.cost, after.cost)})")
     force = f"greatest force {after.force_n:.1f} N"
-    parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
+    parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else "") + _how_surely(known))
     if before.over:
         parts.append(f"{_lines_of(before.over)} above a limit before, now {after.over or 'none'}")
     what = "the exact optimum" if bound.exact else "a bound that no program can beat"
@@ -161,6 +156,13 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     )
     parts.append(f"{which} above {what}")
     return "; ".join(parts)
+
+
+def _how_surely(known: Sensitivity | None) -> str:
+    """Return how surely the force limit is kept, where that is not as surely as it should be."""
+    if known is None or not known.is_unsure:
+        return ""
+    return f", kept with {100 * known.kept:.0f} % probability{'' if known.identified else ' (nothing identified)'}"
 
 
 def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple[str, ...]:

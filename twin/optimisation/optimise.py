@@ -10,7 +10,8 @@ import itertools
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ Progress = Callable[[float, str], None]
 EPOCH = 10
 FREEZES_MAX = 8
 FRONT_MAX = 60
+SEARCHED, PRICE_FROM = 0.67, 0.7
+"""Parts of the work that are done when the search has ended, and when that for the price of a probability begins."""
 
 
 class Stopped(Exception):  # noqa: N818 - no error: the caller asked for it
@@ -86,7 +89,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         made = problem(question)
         searched = search(question, hooks, checkpoint)
         genes, evaluations, chosen = _chosen(made, question, searched)
-        _go_on(hooks, 0.95, "rewriting the program")
+        _go_on(hooks, SEARCHED, "rewriting the program")
         feed, rpm = _words(made, question, genes)
         text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
         if not text.not_followed:
@@ -94,7 +97,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         question = _with_left_alone(question, made, text.not_followed, freezes)
     again = None
     if resimulate:
-        _go_on(hooks, 0.97, "simulating the rewritten program")
+        _go_on(hooks, SEARCHED + 0.01, "simulating the rewritten program")
         again = resimulated(made.program.machine, made.program.text, text.text, question.planned is not None)
     front = _front(made, searched, chosen) if question.objective is Objective.PARETO else ()
     how = Search(
@@ -108,8 +111,27 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         history=searched.history,
         seconds=hooks.clock() - began,
     )
-    _go_on(hooks, 0.99, "what it is worth")
-    return answered(question, made, text, how, front, again)
+    _go_on(hooks, PRICE_FROM, "what it is worth")
+    return answered(question, made, text, how, front, again, partial(_least, hooks))
+
+
+def _least(hooks: Hooks, question: Question) -> float:
+    """The least time or cost that one island finds, its words rounded as a program has them; nothing of it is kept.
+
+    Raises OptimisationError where no program keeps the limits, Stopped.
+    """
+    question = question.with_(objective=single(question.objective), pick=None, islands=1)
+    question = _followed(question.with_(margin=margin(question)))
+
+    def progress(part: float, _what: str) -> None:
+        hooks.progress(PRICE_FROM + (1.0 - PRICE_FROM) * part, "what its probability costs")
+
+    searched = search(question, replace(hooks, save=lambda _text: None, progress=progress), None)
+    made = problem(question)
+    genes, _, _ = _chosen(made, question, searched)
+    feed, rpm = rounded(made, *_words(made, question, genes), worth_of(made, question.objective))
+    seconds, cost = made.evaluate_words(feed[None], rpm[None])
+    return float((seconds if question.objective is Objective.TIME else cost)[0])
 
 
 def _go_on(hooks: Hooks, part: float, what: str) -> None:
@@ -196,7 +218,9 @@ def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched
         states = [json.loads(answer) for answer in hooks.spread(evolve_piece, pieces)]
         done += more
         hooks.save(json.dumps({"question": digest, "states": states, "done": done}))
-        hooks.progress(0.05 + 0.9 * done / max(question.evolutions, 1), f"evolution {done} of {question.evolutions}")
+        hooks.progress(
+            0.05 + (SEARCHED - 0.05) * done / max(question.evolutions, 1), f"evolution {done} of {question.evolutions}"
+        )
     genes = np.concatenate([np.array(state["genes"], dtype=np.float64) for state in states])
     histories = [state["history"] for state in states]
     best = max if question.objective is Objective.PARETO else min

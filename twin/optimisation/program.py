@@ -144,18 +144,13 @@ def programmed(
     moves, words = dialect.interpret(text, machine.settings), dialect.words
     path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
-        raise MachineError(
-            "no [stock]: what a line cuts is not known; give the block with --stock, or a run log with --engagement"
-        )
+        raise MachineError("no [stock]: what a line cuts is not known; give --stock, or a run log with --engagement")
     numbers, tools = tools_used(machine, path)
-    notes = [*remarks(dialect, text, moves), *tool_notes(machine, path)]
-    rows: PathRows | None = None
     sections = tool_sections(numbers, tools, unknown_start(path))
-    collisions: tuple[int, ...] = ()
-    if engagement is None and machine.stock is not None:
-        rows = engaged_along(path, machine.stock, sections)
-        notes += collision_notes(path, rows)
-        collisions = tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
+    rows = None if engagement is not None or machine.stock is None else engaged_along(path, machine.stock, sections)
+    met = rows.lines_met(path) if rows is not None else frozenset(engagement or ())
+    notes = (*remarks(dialect, text, moves, met), *tool_notes(machine, path), *(collision_notes(path, rows) if rows else ()))
+    collisions = () if rows is None else tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     ratios = _feed_ratios(moves)
@@ -195,9 +190,7 @@ def programmed(
         groups.append(found.rows)
     if rows is not None and machine.stock is not None:
         lines = _with_spring_passes(lines, near, touching(path, machine.stock, sections, list(near.values())))
-    return _numbered(
-        Programmed(machine, text, dialect, path, tuple(lines), NO_CUTS, tuple(tools), tuple(notes), collisions), groups
-    )
+    return _numbered(Programmed(machine, text, dialect, path, tuple(lines), NO_CUTS, tuple(tools), notes, collisions), groups)
 
 
 def _feed_ratios(moves: Sequence[Move]) -> dict[int, list[float]]:

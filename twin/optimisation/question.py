@@ -10,7 +10,7 @@ from typing import Any, Self
 from twin.effects.added import check_effects
 from twin.errors import LimitsError, OptimisationError
 from twin.machine import machine_from_toml
-from twin.optimisation.allowed import Impossible, allowed, limits_of
+from twin.optimisation.allowed import Impossible, allowed, check_tools, limits_of
 from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.economy import Economy
 from twin.optimisation.forces import CutForces
@@ -25,7 +25,8 @@ POPULATION_MAX, EVOLUTIONS_MAX, ISLANDS_MAX = 10_000, 100_000, 64
 class Question:
     """A program, a machine, what is wanted, and how to search.
 
-    force_limit_n: None = that of [limits]; probability: with which the force limit is to be kept, None = by the mean twin
+    force_limit_n: None = that of [limits]
+    probability: with which the force limit is to be kept; None = with the constants as stated
     margin: the force limit is divided by it, for a limit that is kept with a probability (`twin.optimisation.uncertainty`)
     islands: populations that search beside each other; the answer is the best of them, whoever works them out
     planned: what each line (from 0) cuts, where it is not taken from [stock]: line → [depth mm, entry rad, exit rad]
@@ -121,6 +122,7 @@ def _leaves(made: Problem, question: Question) -> str:
 def _made(text: str) -> tuple[Problem, tuple[Impossible, ...], str]:
     question = Question.from_json(text)
     machine = machine_from_toml(question.machine_toml)
+    check_tools(machine)
     check_effects(machine)
     limits = limits_of(machine, question.force_limit_n)
     if limits.force_n is not None:

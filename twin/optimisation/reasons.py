@@ -10,8 +10,11 @@ SLOW = 1.25
 EDGE_RPM = 1.5
 
 
-def what_binds(made: Problem, row: int, line: Cutting, objective: Objective, own_rpm: float) -> str:
-    """The limits that a line is at, joined by `and`; where none holds the speed, what else does. own_rpm: best by itself."""
+def what_binds(made: Problem, row: int, line: Cutting, waits_s: float, objective: Objective, own_rpm: float) -> str:
+    """The limits that a line is at, joined by `and`; where none holds the speed, what else does.
+
+    waits_s: the part of its seconds in which it waits for the spindle; own_rpm: best by itself
+    """
     allowed = made.allowed
     reasons: list[Binds] = []
     full = line.feed_mm_min >= (1.0 - NEAR) * allowed.feed_high
@@ -27,8 +30,11 @@ def what_binds(made: Problem, row: int, line: Cutting, objective: Objective, own
     if full:
         reasons.append(Binds.FEED)
     source = made.program.lines[int(allowed.index[row])]
-    if line.seconds > SLOW * 60.0 * source.length_mm / (line.feed_mm_min * allowed.feed_ratio):
+    feeding_s = 60.0 * source.length_mm / (line.feed_mm_min * allowed.feed_ratio)
+    if line.seconds - waits_s > SLOW * feeding_s:
         reasons.append(Binds.DYNAMICS)
+    if waits_s > (SLOW - 1.0) * feeding_s or (waits_s > 0.0 and _is_slower(line.spindle_rpm, own_rpm)):
+        reasons.append(Binds.RUN_UP)
     return " and ".join(dict.fromkeys(reasons))
 
 
@@ -50,3 +56,8 @@ def _why_no_faster(made: Problem, row: int, rpm: float, objective: Objective, ow
     if shares and abs(rpm - own_rpm) > max(EDGE_RPM, NEAR * own_rpm):
         return [Binds.SHARED_SPEED]
     return [Binds.TOOL_LIFE] if objective is not Objective.TIME else [Binds.SPEED_CHANGE]
+
+
+def _is_slower(rpm: float, own_rpm: float) -> bool:
+    """Return True where a line turns slower than would be best for it by itself."""
+    return rpm < own_rpm - max(EDGE_RPM, NEAR * own_rpm)

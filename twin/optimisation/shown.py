@@ -17,7 +17,10 @@ HAIR = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShownLines:
-    """The figures of each feed line of the program, (lines,); the worst of its cuts, zeros in air."""
+    """The figures of each feed line of the program, (lines,); the worst of its cuts, zeros in air.
+
+    waits_s: the part of its seconds in which the axes stand for the spindle
+    """
 
     feed_mm_min: Floats
     rpm: Floats
@@ -27,6 +30,7 @@ class ShownLines:
     chip_mm: Floats
     surface_speed_m_min: Floats
     seconds: Floats
+    waits_s: Floats
     cost: Floats | None
 
     def line(self, k: int) -> Cutting:
@@ -54,8 +58,10 @@ def shown_lines(problem: Problem, forces: CutForces, path: Path) -> ShownLines:
     diameter = np.array([program.tools[line.tool][1].diameter_mm if line.tool >= 0 else 0.0 for line in program.lines])
     force, power, torque, chip = _cut(problem, forces, feed, rpm)
     made = problem.control.plan(path)
-    by_line = made.seconds_by_line()
-    seconds = np.array([by_line[line.line] if line.line < len(by_line) else 0.0 for line in program.lines])
+    seconds, waits = (
+        np.array([by_line[line.line] if line.line < len(by_line) else 0.0 for line in program.lines])
+        for by_line in (made.seconds_by_line(), made.waits_by_line())
+    )
     cost = None
     if problem.economy is not None:
         share = np.array([line.cut_mm / max(line.length_mm, 1e-12) for line in program.lines])
@@ -63,7 +69,7 @@ def shown_lines(problem: Problem, forces: CutForces, path: Path) -> ShownLines:
         cost = seconds * (
             problem.economy.per_second + problem.economy.per_tool * wears * problem.economy.lives_per_s(diameter, rpm)
         )
-    return ShownLines(feed, rpm, force, power, torque, chip, np.pi * diameter * rpm / 1000.0, seconds, cost)
+    return ShownLines(feed, rpm, force, power, torque, chip, np.pi * diameter * rpm / 1000.0, seconds, waits, cost)
 
 
 def advances(problem: Problem, feed: Floats, rpm: Floats, teeth: Floats) -> Floats:

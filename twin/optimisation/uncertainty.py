@@ -79,7 +79,7 @@ def greatest_forces_n(forces: CutForces, advance_mm: Floats, factors: Mapping[st
 
 
 def margin_for(forces: CutForces, advance_mm: Floats, machine: MachineFile, probability: float, seed: int) -> float:
-    """Return the divisor of the limit: the quantile of the greatest force over that of the mean twin, at least 1."""
+    """Return the divisor of the limit: the quantile of the greatest force over that with the constants as stated, at least 1."""
     constants = uncertain_constants(machine, forces.numbers)
     if not constants or not len(forces.cuts):
         return 1.0
@@ -89,9 +89,12 @@ def margin_for(forces: CutForces, advance_mm: Floats, machine: MachineFile, prob
 
 
 def sensitivity(
-    forces: CutForces, advance_mm: Floats, machine: MachineFile, limit_n: float, asked: float | None, price_pct: float, seed: int
+    forces: CutForces, advance_mm: Floats, machine: MachineFile, limit_n: float, asked: float | None, seed: int
 ) -> Sensitivity | None:
-    """The force limit under the twin's uncertainty; None where nothing is uncertain or nothing is cut. On draws of its own."""
+    """The force limit under the twin's uncertainty, its price left open; None where nothing is uncertain or nothing is cut.
+
+    On draws of its own.
+    """
     constants = uncertain_constants(machine, forces.numbers)
     if not constants or not len(forces.cuts):
         return None
@@ -111,9 +114,10 @@ def sensitivity(
         force_low_n=float(low),
         force_high_n=float(high),
         priced=PRICED if asked is None else asked,
-        price_pct=price_pct,
+        price_pct=float("nan"),
         parts=tuple(parts),
         source=_source(constants),
+        identified=any(one.identified for one in constants),
     )
 
 

@@ -1,6 +1,6 @@
 """Remarks on a program that can be read, and that nobody meant so: it is cut off, or it cuts with the spindle at rest."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 from twin.programs.canonical import Arc, Linear, Move, ProgramEnd, Spindle
@@ -10,13 +10,14 @@ from twin.programs.source import source_lines
 SHOWN_MAX: Final = 40
 
 
-def remarks(dialect: Dialect, text: str, moves: Sequence[Move]) -> tuple[str, ...]:
+def remarks(dialect: Dialect, text: str, moves: Sequence[Move], met: Collection[int] | None = None) -> tuple[str, ...]:
     """Return what a person should know of a program before trusting its figures.
 
     moves: of this text, with what it calls
+    met: the lines from 0 that feed into the stock, those of called programs as a line beyond the text; None = not known
     """
     lines = source_lines(text)
-    return (*_cut_off(dialect, lines, moves), *_spindle_at_rest(dialect, lines, moves))
+    return (*_cut_off(dialect, lines, moves), *_spindle_at_rest(dialect, lines, moves, met))
 
 
 def _cut_off(dialect: Dialect, lines: list[str], moves: Sequence[Move]) -> Iterator[str]:
@@ -33,22 +34,28 @@ def _cut_off(dialect: Dialect, lines: list[str], moves: Sequence[Move]) -> Itera
     )
 
 
-def _spindle_at_rest(dialect: Dialect, lines: list[str], moves: Sequence[Move]) -> Iterator[str]:
-    """Yield a sentence where a program feeds, and the spindle turns nowhere in it. One that only probes needs no spindle."""
+def _spindle_at_rest(dialect: Dialect, lines: list[str], moves: Sequence[Move], met: Collection[int] | None) -> Iterator[str]:
+    """Yield a sentence where a program cuts, and the spindle turns nowhere in it. One that only probes needs no spindle."""
     starts = [move for move in moves if isinstance(move, Spindle) and move.direction != 0]
     if any(move.rpm > 0.0 for move in starts):
         return
-    feeds = (move for move in moves if isinstance(move, Linear | Arc))
-    cuts = (move for move in feeds if move.program is not None or not dialect.words.probes(lines[move.line]))
-    first = next(cuts, None)
+    called_met = met is not None and any(not 0 <= line < len(lines) for line in met)
+
+    def may_cut(move: Linear | Arc) -> bool:
+        if move.program is not None:
+            return met is None or called_met
+        return not dialect.words.probes(lines[move.line]) and (met is None or move.line in met)
+
+    first = next((move for move in moves if isinstance(move, Linear | Arc) and may_cut(move)), None)
     if first is None:
         return
     where = first.program if first.program is not None else _place(dialect, lines, first.line)
+    what = "the feed moves" if met is None else "the cuts"
     if starts:
         begun = starts[0].program if starts[0].program is not None else _place(dialect, lines, starts[0].line)
-        yield f"{begun} starts the spindle without a speed, and none follows: the cuts from {where} on have a spindle at rest"
+        yield f"{begun} starts the spindle without a speed, and none follows: {what} from {where} on have a spindle at rest"
     else:
-        yield f"nothing starts the spindle: the cuts from {where} on have a spindle at rest; write {dialect.start} before"
+        yield f"nothing starts the spindle: {what} from {where} on have a spindle at rest; write {dialect.start} before"
 
 
 def _place(dialect: Dialect, lines: list[str], at: int) -> str:

@@ -23,6 +23,7 @@ from twin.motion.sampling import sampled
 from twin.programs import FeedForward, Settings
 from twin.programs.called import with_line_elsewhere
 from twin.programs.discovery import dialect_of
+from twin.programs.fanuc.lathe import lathe_remarks
 from twin.programs.remarks import remarks
 from twin.programs.source import source_lines
 from twin.runlog import RunLog, run_log
@@ -87,7 +88,7 @@ def simulate(
     settings = program_settings(machine) if settings is None else settings
     dialect = dialect_of(text, settings)
     own = dialect.interpret(text, settings)
-    notes = [*remarks(dialect, text, own)]
+    notes: list[str] = [*lathe_remarks(machine.axes)]
     moves = with_line_elsewhere(own, len(source_lines(text)))
     path = path_from_moves(moves, settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
@@ -102,7 +103,8 @@ def simulate(
     if planned.total_s / period_s > TICKS_MAX:
         raise MachineError(f"{name} takes {planned.total_s:.0f} s, more than {TICKS_MAX} ticks of {period_s} s; split it")
     motion = sampled(planned, period_s)
-    engaged = _engagement(machine, path, motion, notes)
+    engaged, met = _engagement(machine, path, motion, notes)
+    notes = [*remarks(dialect, text, own, met), *notes]
     angle = np.concatenate([[0.0], np.cumsum(motion.spindle_rpm)[:-1]]) * (2.0 * np.pi / 60.0 * period_s)
     told = RunInput(
         t_s=motion.t_s,
@@ -169,8 +171,13 @@ def _saturated(machine: MachineFile, response: Response) -> list[str]:
     return said
 
 
-def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[str]) -> dict[str, Floats]:
-    """Depth and angles of the cut at each tick; nothing is cut where the machine states no stock or no tool."""
+def _engagement(
+    machine: MachineFile, path: Path, motion: Motion, notes: list[str]
+) -> tuple[dict[str, Floats], frozenset[int] | None]:
+    """Depth and angles of the cut at each tick; nothing is cut where the machine states no stock or no tool.
+
+    Also returns the lines that meet the stock, None where that is not known.
+    """
     ticks = len(motion)
     none = {name: np.zeros(ticks) for name in ("axial_depth_mm", "entry_angle_rad", "exit_angle_rad")}
     if machine.stock is None or machine.tool is None:
@@ -178,9 +185,9 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
             one_only = " (simulate knows one tool, [tool]; cnctwin expect knows [tools.N])" if machine.tools else ""
             missing = "[stock]" if machine.stock is None else f"[tool]{one_only}"
             notes.append(f"no {missing}: the program is run in air")
-        return none
+        return none, None
     if path.axes[:3] != ("x", "y", "z") or not len(path):
-        return none
+        return none, None
     if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
         one = f"the {machine.tool.diameter_mm:g} mm one of [tool]"
         beside = "; expect and optimise take each [tools.N]" if machine.tools else ""
@@ -200,7 +207,7 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     ):
         if wrong.any():
             notes.append(f"line {int(motion.line[int(np.argmax(wrong))]) + 1}: {why}")
-    return {name: np.where(cutting, getattr(rows, name)[row], 0.0) for name in none}
+    return {name: np.where(cutting, getattr(rows, name)[row], 0.0) for name in none}, rows.lines_met(path)
 
 
 def _coolant(planned: Plan, motion: Motion) -> Floats:

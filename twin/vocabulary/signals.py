@@ -115,6 +115,8 @@ _TABLE = (
 SIGNALS = {entry.name: entry for entry in _TABLE}
 OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")
+ADDED = frozenset((*DERIVED, "clock_offset_s", "clock_offset_spread_s", "stamp_clock", "edge_sequence"))
+"""Names that an edge adds to the signals of a control."""
 # Beside the canonical signals: raw samples of an accelerometer, an array, which the processor `vibration` reads.
 VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ = "vibration_block_g", "vibration_sample_rate_hz"
 # Lengths that the gap takes from canonical signals: of a tool change, and of a section of a program between two of them.

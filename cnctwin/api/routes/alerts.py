@@ -15,7 +15,7 @@ from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
-from cnctwin.plant.alert_desk import FRESH_S_MAX
+from cnctwin.plant.alert_desk import ALERTS_NODE, FRESH_S_MAX, silent
 from cnctwin.processes import published_state
 from sparkplug.clock import now_ms
 from twin.vocabulary.topics import ALERT_COMMAND
@@ -81,7 +81,7 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
     async def alerts() -> Any:
         """All alerts, silences and receivers; `available` false, with the reason, where nobody keeps them up."""
         state = live.alerts()
-        reason = _trouble(state)
+        reason = alerts_trouble(live, state)
         return {
             "alerts": [],
             "silences": [],
@@ -147,7 +147,7 @@ def _signed(request: Request, given: str) -> str:
 def _kept_up(live: LivePlant) -> Mapping[str, Any]:
     """The state of alerts. Raises ApiError where nobody keeps it up."""
     state = live.alerts()
-    if (reason := _trouble(state)) is not None or state is None:
+    if (reason := alerts_trouble(live, state)) is not None or state is None:
         raise ApiError(503, reason or "nothing was heard of alerts")
     return state
 
@@ -180,10 +180,9 @@ def _one(state: Mapping[str, Any], start: str) -> Mapping[str, Any]:
     return found[0]
 
 
-def _trouble(state: Mapping[str, Any] | None) -> str | None:
+def alerts_trouble(live: LivePlant, state: Mapping[str, Any] | None) -> str | None:
+    """Return why the state of alerts cannot be relied on; None where it can. It is retained, and outlives its processor."""
     if state is None:
         return "nothing was heard of alerts; does the processor run? (cnctwin process alerts)"
-    age_s = published_state.age_s(state, time.time())
-    if age_s > FRESH_S_MAX:
-        return f"the state of alerts is {age_s:.0f} s old: the processor `alerts` does not run any more"
-    return None
+    is_gone = any(view.node == ALERTS_NODE and not view.online for view in live.nodes())
+    return silent(state) if is_gone or published_state.age_s(state, time.time()) > FRESH_S_MAX else None

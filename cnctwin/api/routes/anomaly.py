@@ -37,7 +37,7 @@ class VerdictRequest(BaseModel):
     )
     verdict: Literal["true", "false", "known"]
     label: str = Field(
-        "", max_length=60, pattern=LINE, description="what it was, in a few words; later alarms that look like it name it"
+        "", max_length=60, pattern=LINE, description="what it was, in a few words; shown at later alarms that look like it"
     )
     by: str = Field("", max_length=100, pattern=LINE)
     alarm_at_s: float | None = Field(

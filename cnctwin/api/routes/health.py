@@ -10,11 +10,11 @@ from cnctwin.api.answers import Health, Part, Ready
 from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.residual import models_part
+from cnctwin.api.routes.alerts import alerts_trouble
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ApplicationError
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
-from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
 from cnctwin.plant.quarantine import SHOWN_MAX, refused_lines
 from cnctwin.processes import published_state
@@ -148,10 +148,8 @@ def _alerts(live: LivePlant) -> Part:
     state = live.alerts()
     if state is None:
         return Part(part="alerts", state="missing", reason="nothing was heard of alerts", do="cnctwin process alerts")
-    age_s = published_state.age_s(state, time.time())
-    if age_s > FRESH_S_MAX:
-        line = f"the state of alerts is {age_s:.0f} s old: the processor does not run any more"
-        return Part(part="alerts", state="degraded", reason=line, do="cnctwin process alerts")
+    if (reason := alerts_trouble(live, state)) is not None:
+        return Part(part="alerts", state="degraded", reason=reason, do="cnctwin process alerts")
     return Part(part="alerts", state="ok", reason="the processor keeps its state up")
 
 

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
-from rich.text import Text
 
 from cnctwin.commands.options import AsJson, Broker
 from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.table import left_out, text_table
 
 if TYPE_CHECKING:
     from edge.adapter import Row
 
 REASON_CHARACTERS_MAX = 40
 """The length of a reason that a table may repeat."""
-
+COLUMNS = ("signal", "from", "unit", "native unit", "value now", "why not")
 edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
 
 
@@ -51,7 +51,10 @@ def check(config: Annotated[Path, typer.Argument(help="The TOML file of one mach
         sys.stdout.write(json.dumps([asdict(row) for row in rows], default=str) + "\n")
     else:
         console, reasons = standard_output(), repeated(rows)
-        console.print(_table(rows, reasons))
+        table = _table(rows, reasons, console.width)
+        console.print(table)
+        if missing := left_out(table, COLUMNS):
+            console.print(f"no room for: {', '.join(missing)}; a wider terminal or --json shows it", style="dim", soft_wrap=True)
         for number, reason in enumerate(reasons, 1):
             console.print(f"({number}) {reason}", markup=False, highlight=False, soft_wrap=True)
 
@@ -75,16 +78,14 @@ def repeated(rows: "Sequence[Row]") -> tuple[str, ...]:
     return tuple(reason for reason, count in counts.items() if count > 1)
 
 
-def _table(rows: "Sequence[Row]", reasons: Sequence[str]) -> Table:
+def _table(rows: "Sequence[Row]", reasons: Sequence[str], width: int) -> Table:
     """Return the signals that an edge would publish, for a person to read. reasons: those that stand below, by number"""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
-    added = "the edge adds tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
-    shown = Table(title=f"{signals} signals would be published; {added}", title_justify="left")
-    for column in ("signal", "from", "unit", "native unit", "value now", "why not"):
-        shown.add_column(column, overflow="fold")
+    added = "the edge adds its own: tool_change_…, clock_offset_…, stamp_clock and edge_sequence"
+    cells = []
     for row in rows:
         value = "–" if row.value is None else str(row.value)
         why = f"({reasons.index(row.reason) + 1}) below" if row.reason in reasons else row.reason or ""
-        cells = (row.signal, row.source, row.unit or "", row.native_unit or "", value, why)
-        shown.add_row(*(Text(cell) for cell in cells))  # as text: a bracket in a block of the program is no markup
-    return shown
+        cells.append((row.signal, row.source, row.unit or "", row.native_unit or "", value, why))
+    title = f"{signals} signals would be published; {added}"
+    return text_table(COLUMNS, cells, width, ("native unit", "unit", "from"), title=title, show_edge=True)

@@ -16,11 +16,15 @@ def init(
         str | None, typer.Option(help="Address of the control, as `edge discover` takes it; none = without one for now")
     ] = None,
     device: Annotated[str, typer.Option(help="MTConnect: which of several devices")] = "",
-    machine: Annotated[str | None, typer.Option(help="Name of the machine; else that of the control's own description")] = None,
+    machine: Annotated[
+        str | None, typer.Option(help="Name of the machine; else that of the control's own description, in small letters")
+    ] = None,
     broker: Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; private = one of our own")] = None,
     alerts: Annotated[
         str | None,
-        typer.Option(help="pushover, an https:// address, an address of Apprise, or none; secrets from the environment"),
+        typer.Option(
+            help="pushover, https://… (http:// on this computer), an address of Apprise, or none; secrets from the environment"
+        ),
     ] = None,
     machine_class: Annotated[
         str | None, typer.Option("--class", help="Starter description: vmc-40, hmc, lathe, router or five-axis")

@@ -27,7 +27,7 @@ def process(
         typer.Option("--member", "--name", help="With Kafka: name of this runner, the same at each start; else the computer's"),
     ] = "",
 ) -> None:
-    """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
+    """Run processors until SIGTERM or Ctrl-C; alerts also sends its notifications, historian keeps a store."""
     if kafka or kafka_config is not None:
         _over_kafka(names, config, broker, group, kafka, kafka_config, member)
         return
@@ -57,7 +57,7 @@ def _over_kafka(
     kafka_config: Path | None,
     member: str,
 ) -> None:
-    """Run processors as the members of a consumer group; only the courier of alerts needs a broker."""
+    """Run processors as the members of a consumer group; only alerts needs a broker, to send its notifications."""
     from cnctwin.kafka.settings import settings_of
     from cnctwin.processes.extras import needed_by
 

@@ -6,28 +6,31 @@ Exit codes: 0 = done, or nothing fires unacknowledged; 1 = something does, or th
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
 from cnctwin.commands.options import AsJson, Broker, Wait
 from cnctwin.errors import UsageError
 from cnctwin.plant.alert_desk import alert_desk
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
-from cnctwin.terminal.table import text_table
+from cnctwin.terminal.table import left_out, text_table
 
 TEST_S_MAX = 30.0
 ID_SHOWN = 8
 TABLE_WIDTH = 140
 OVER_SHOWN_MAX = 20
-ALERT_COLUMNS = ("", "severity", "alert", "state", "since (UTC)", "for", "told", "by")
-OVER_COLUMNS = ("", "severity", "alert", "from (UTC)", "to (UTC)")
+ALERT_COLUMNS = ("number", "severity", "alert", "state", "since (UTC)", "for", "told", "by")
+OVER_COLUMNS = ("number", "severity", "alert", "from (UTC)", "to (UTC)")
+GIVES_WAY = ("since (UTC)", "told", "from (UTC)", "severity")
+"""Columns that a narrow terminal is not shown; "for" says since when too."""
 RECEIVER_COLUMNS = ("receiver", "delivered", "failed", "waiting", "held back", "last error")
-_DURATION = re.compile(r"(\d+(?:\.\d+)?)([smhd]?)")
-_SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
+_DURATION = re.compile(r"(\d+(?:\.\d+)?)([smhd])")
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 alerts_app = typer.Typer(no_args_is_help=True, help="What fires, who knows of it, and who takes care of it.")
 
@@ -53,7 +56,7 @@ def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = Fal
 
 @alerts_app.command()
 def ack(
-    fingerprint: Annotated[str, typer.Argument(help="Fingerprint of the alert, or its beginning")],
+    fingerprint: Annotated[str, typer.Argument(help="Number of the alert in `list`, or its beginning")],
     by: By,
     comment: Comment = "",
     broker: Broker = None,
@@ -89,14 +92,14 @@ def silence(
 
 @alerts_app.command()
 def unsilence(
-    silence: Annotated[str, typer.Argument(help="Id of the silence, as `list` shows it")],
+    silence: Annotated[str, typer.Argument(help="Number of the silence in `list`, or its beginning")],
     by: By,
     broker: Broker = None,
     wait_s: Wait = 5.0,
 ) -> None:
     """End a silence now."""
     with alert_desk(address(broker), wait_s) as desk:
-        print(desk.command("unsilence", wait_s, by=by, silence=silence))
+        print(desk.command("unsilence", wait_s, by=by, silence=_one_silence(desk.state, silence)))
 
 
 @alerts_app.command("test")
@@ -110,13 +113,14 @@ def try_receiver(
     with alert_desk(address(broker), wait_s) as desk:
         before = _counts(desk.state, receiver)
         key = desk.command("test", wait_s, by=by, receiver=receiver)
-        desk.until(lambda: _counts(desk.state, receiver) != before, max(wait_s, TEST_S_MAX))
+        desk.until(lambda: _counts(desk.state, receiver) != before or _not_taken(desk.state, receiver), max(wait_s, TEST_S_MAX))
         failure = next((one for one in desk.state.get("failures", ()) if one.get("id") == key), None)
         if failure is not None:
             print(f"{receiver}: failed: {failure['reason']}", file=sys.stderr)
             raise typer.Exit(1)
         if _counts(desk.state, receiver) == before:
-            print(f"{receiver}: nothing is known of it yet; is the courier running? `list` shows what waits", file=sys.stderr)
+            waits = f"no outcome within {max(wait_s, TEST_S_MAX):g} s; `cnctwin alerts list` shows what waits"
+            print(f"{receiver}: {_not_taken(desk.state, receiver) or waits}", file=sys.stderr)
             raise typer.Exit(1)
         print(f"{receiver}: delivered")
 
@@ -127,6 +131,8 @@ def duration_s(text: str) -> float:
     >>> duration_s("90s"), duration_s("2h"), duration_s("0.5d")
     (90.0, 7200.0, 43200.0)
     """
+    if text.strip().replace(".", "", 1).isdecimal():
+        raise UsageError(f"--for {text!r} has no unit; write {text.strip()}h for hours, {text.strip()}m for minutes")
     found = _DURATION.fullmatch(text.strip())
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
     if not 0.0 < seconds <= 30 * 86_400.0:
@@ -141,7 +147,23 @@ def _one(state: Mapping[str, Any], start: str) -> Mapping[str, Any]:
     if len(found) == 1:
         return found[0]
     firing = ", ".join(f"{alert['fingerprint'][:ID_SHOWN]} {alert['annotations'].get('summary', '')}" for alert in on[:10])
-    raise UsageError(f"{len(found) or 'no'} alerts fire whose fingerprint begins with {start!r}; there are: {firing or 'none'}")
+    raise UsageError(f"{len(found) or 'no'} alerts fire whose number begins with {start!r}; there are: {firing or 'none'}")
+
+
+def _one_silence(state: Mapping[str, Any], start: str) -> str:
+    """Return the number of the silence that begins like this."""
+    silences = list(state.get("silences", ()))
+    found = [str(one["id"]) for one in silences if start and one["id"].startswith(start)]
+    if len(found) == 1:
+        return found[0]
+    there = "; ".join(map(_silence_line, silences[:10])) or "none"
+    raise UsageError(f"{len(found) or 'no'} silences have a number that begins with {start!r}; there are: {there}")
+
+
+def _silence_line(one: Mapping[str, Any]) -> str:
+    what = ", ".join(f"{name} {pattern}" for name, pattern in one["matchers"].items())
+    why = f": {one['comment']}" if one["comment"] else ""
+    return f"{one['id']}: {what}, until {_moment(one['ends'])} UTC, by {one['by']}{why}"
 
 
 def _counts(state: Mapping[str, Any], receiver: str) -> tuple[int, int]:
@@ -149,27 +171,37 @@ def _counts(state: Mapping[str, Any], receiver: str) -> tuple[int, int]:
     return int(known.get("delivered", 0)), int(known.get("failed", 0))
 
 
+def _not_taken(state: Mapping[str, Any], receiver: str) -> str:
+    """Return what is the matter with a notification that is tried again; "" where none is."""
+    known = state.get("receivers", {}).get(receiver, {})
+    return str(known["last_error"]) if known.get("not_taken") else ""
+
+
 def _show(state: Mapping[str, Any]) -> None:
     console = standard_output(TABLE_WIDTH)
     alerts = [alert for alert in state.get("alerts", ()) if alert.get("phase") != "resolved"]
     if alerts:
-        console.print(text_table(ALERT_COLUMNS, map(_alert_row, alerts)))
+        _print_table(console, ALERT_COLUMNS, map(_alert_row, alerts))
     else:
         console.print("no alert fires")
     over = [alert for alert in state.get("alerts", ()) if alert.get("phase") == "resolved"]
     if over:
         latest = sorted(over, key=lambda alert: str(alert["endsAt"]), reverse=True)[:OVER_SHOWN_MAX]
         console.print()
-        console.print(text_table(OVER_COLUMNS, map(_over_row, latest)))
+        _print_table(console, OVER_COLUMNS, map(_over_row, latest))
     for one in state.get("silences", ()):
-        what = ", ".join(f"{name} {pattern}" for name, pattern in one["matchers"].items())
-        why = f": {one['comment']}" if one["comment"] else ""
-        line = f"silence {one['id']}: {what}, until {_moment(one['ends'])} UTC, by {one['by']}{why}"
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(f"silence {_silence_line(one)}", markup=False, highlight=False, soft_wrap=True)
     if state.get("receivers"):
         console.print()
         rows = (_receiver_row(name, known) for name, known in state["receivers"].items())
-        console.print(text_table(RECEIVER_COLUMNS, rows))
+        _print_table(console, RECEIVER_COLUMNS, rows)
+
+
+def _print_table(console: Console, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    table = text_table(columns, rows, console.width, [name for name in GIVES_WAY if name in columns])
+    console.print(table)
+    if missing := left_out(table, columns):
+        console.print(f"no room for: {', '.join(missing)}; a wider terminal or --json shows it", style="dim", soft_wrap=True)
 
 
 def _alert_row(alert: Mapping[str, Any]) -> list[str]:

@@ -13,6 +13,10 @@ from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
 
+STYLES = {"good": "green", "note": "cyan", "bad": "bold red"}
+UNMAPPED = "unmapped"
+"""The reason for which an edge drops what its configuration has no signal for."""
+
 
 def doctor(
     broker: Broker = None,
@@ -46,11 +50,12 @@ def doctor(
     else:
         console = standard_output()
         for finding in report.findings:
-            mark = "[green]good[/]" if finding.good else "[bold red]bad [/]"
-            console.print(mark, end=" ")
+            console.print(f"{finding.mark:<4}", style=STYLES[finding.mark], end=" ")
             console.print(finding.text, markup=False, highlight=False, soft_wrap=True)
         if report.ledgers:
             console.print(ledger_table(report.ledgers))
+            if any(UNMAPPED in ledger.reasons for ledger in report.ledgers):
+                console.print(f"{UNMAPPED}: values that the control offers and the edge's configuration gives no signal")
     if bundle is not None:
         from cnctwin.plant.bundle import summary, write_bundle
 

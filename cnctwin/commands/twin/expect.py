@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from twin.machine import Tool
 
 
+FORCE_NOTE = (
+    "note: the mean tangential force is the one that loads the spindle; simulate and optimise print the peak of the resultant, "
+    "which is greater"
+)
+
+
 def expect(
     programs: Annotated[list[Path], typer.Argument(help="Part programs; the name of a file is that of its program")],
     machine: MachineDescription,
@@ -153,7 +159,7 @@ def _shown(made: "Expectation", program: Path, path: Path | None, *, as_json: bo
     if as_json:
         return answer
     table = Table(title=f"{program.name} on {made.machine}: {made.time_s:.1f} s", title_justify="left")
-    for column in ("tool", "time s", "lines", "peak load %", "peak of the mean tangential force N", "lines without load"):
+    for column in ("tool", "time s", "lines", "peak load %", "greatest mean tangential force N", "lines without load"):
         table.add_column(column, justify="right")
     for one in summary:
         load = "–" if one.load_pct is None else f"{one.load_pct:.1f}"
@@ -161,6 +167,8 @@ def _shown(made: "Expectation", program: Path, path: Path | None, *, as_json: bo
         table.add_row(str(one.tool or "–"), f"{one.time_s:.1f}", str(one.lines), load, force, str(one.unknown or ""))
     console = standard_output()
     console.print(table)
+    if any(one.force_n for one in summary):
+        console.print(FORCE_NOTE, markup=False, highlight=False, soft_wrap=True)
     for sentence in made.basis:
         console.print(f"note: {sentence}", markup=False, highlight=False, soft_wrap=True)
     console.print("up to date" if path is None else f"in {path}", markup=False, highlight=False, soft_wrap=True)

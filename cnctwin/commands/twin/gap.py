@@ -131,7 +131,7 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
     gap = found.gap
     console.print(
         f"gap {gap.before:.3g} → {gap.after:.3g} × the repeatability; closed {100 * gap.closure:.1f} % "
-        f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}), on runs {unseen}; "
+        f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}) of its square, on runs {unseen}; "
         f"with the constants of the machine file {gap.as_stated:.3g}",
         highlight=False,
         soft_wrap=True,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cnctwin.commands.options import WHEN, AsJson, From, Programs, StorePlace, To
+from cnctwin.commands.options import WHEN, AsJson, From, Programs, StorePlace, To, file_or_class
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
 from cnctwin.processes.extras import needed_by
@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from cnctwin.composing.composed import Composed
 
 ON_SHOWN = 4
-Machine = Annotated[str | None, typer.Option("--machine", help="Name of the machine, as the store has it")]
+Machine = Annotated[
+    str | None,
+    typer.Option(
+        "--machine", help="Name of the machine, as the store has it; with run logs: its machine.toml, or a class, as vmc-40"
+    ),
+]
 MachineFile = Annotated[
     Path | None, typer.Option(help="machine.toml; else M.toml in $CNCTWIN_MACHINES or ./machines, else an assumed machine")
 ]
@@ -55,11 +60,9 @@ def case(
     """
     said = {"--fit": fit, "--check": check, "--kind": kind, "--repeats": repeats, "--program": program, "--healthy": healthy}
     if runs:
-        if given := [
-            name for name, v in _of_store(store, machine, from_, to, programs, healthy_from, healthy_to, ambient_c) if v
-        ]:
-            raise UsageError(f"{given[0]} belongs to a case from a store; give run logs or --machine, not both")
-        done = _from_runs(runs, machine_file, out, {name: values or [] for name, values in said.items()})
+        if given := [name for name, v in _of_store(store, from_, to, programs, healthy_from, healthy_to, ambient_c) if v]:
+            raise UsageError(f"{given[0]} belongs to a case from a store; leave it out, or the run logs")
+        done = _from_runs(runs, _description(machine, machine_file), out, {name: values or [] for name, values in said.items()})
     elif machine is None:
         raise UsageError("name run logs, or a machine of the store: --machine NAME; `cnctwin store status` tells which it has")
     else:
@@ -74,9 +77,16 @@ def case(
     raise typer.Exit(0 if done.has_check else 1)
 
 
+def _description(machine: str | None, machine_file: Path | None) -> Path | None:
+    """Return the file that describes the machine of run logs, by either of its options. Raises UsageError where both name one."""
+    if machine is None or machine_file is None:
+        return machine_file if machine is None else file_or_class(Path(machine))
+    raise UsageError(f"--machine {machine} and --machine-file {machine_file}: two descriptions of one machine; give one")
+
+
 def _of_store(*values: object) -> list[tuple[str, object]]:
     """Return the options of a case from a store, by name."""
-    names = ("--store", "--machine", "--from", "--to", "--programs", "--healthy-from", "--healthy-to", "--ambient-c")
+    names = ("--store", "--from", "--to", "--programs", "--healthy-from", "--healthy-to", "--ambient-c")
     return [(name, value is not None) for name, value in zip(names, values, strict=True)]
 
 

@@ -53,7 +53,7 @@ def machine_file_of(given: Path | None) -> Path:
     if given is not None:
         return given
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise UsageError("--machine-file machine.toml is missing: the case holds the twin as it stands")
+        raise UsageError("--machine machine.toml is missing: the case holds the twin as it stands")
     return Path(typer.prompt("The machine's description", default="machine.toml", err=True))
 
 

@@ -1,6 +1,7 @@
 """`cnctwin optimise`: feed and spindle speed for each line of a part program."""
 
 import json
+import math
 import os
 import sys
 import time
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import twin.optimisation.question as asked
     from cnctwin.batch.optimisation import Files
     from twin.machine import MachineFile
-    from twin.optimisation.answer import Objective, Optimised, SpeedChanges
+    from twin.optimisation.answer import Objective, Optimised, Sensitivity, SpeedChanges
     from twin.programs import Settings
 
 BINDS_SHOWN, FRONT_SHOWN = 6, 20
@@ -40,7 +41,7 @@ def optimise(
     feed_range: Annotated[str | None, typer.Option(help="LOW:HIGH, mm/min; else that of \\[limits]")] = None,
     speed_range: Annotated[str | None, typer.Option(help="LOW:HIGH, rev/min; else that of \\[limits]")] = None,
     probability: Annotated[
-        float | None, typer.Option(help="Keep the force limit with this probability, as 0.95; else by the mean twin")
+        float | None, typer.Option(help="Keep the force limit with this probability, as 0.95; else with the constants as stated")
     ] = None,
     speed_changes: Annotated[
         str, typer.Option(help="Where the spindle may change its speed: anywhere, in_air (never in the material) or per_tool")
@@ -70,7 +71,10 @@ def optimise(
         from cnctwin.files.called_programs import speaking
         from twin.machine import read_machine
         from twin.machine_toml import machine_to_toml
-    described = _with_ranges(with_stock(read_machine(machine), stock), feed_range, speed_range)
+        from twin.optimisation.allowed import check_tools
+    described = read_machine(machine)
+    check_tools(described)
+    described = _with_ranges(with_stock(described, stock), feed_range, speed_range)
     text, encoding = read_encoded(program)
     described = speaking(described, program, text)
     question = asked.Question(
@@ -235,7 +239,7 @@ def _progress() -> Iterator[Callable[[float, str], None]]:
 
 
 def _show(found: "Optimised", console: Console) -> None:
-    """Before, after, distance, what binds, and how sure it is."""
+    """Before, after, distance, what limits it, and how sure it is."""
     console.print(f"{found.name}: {found.sentence}", style="bold", markup=False, highlight=False, soft_wrap=True)
     table = Table(title_justify="left")
     for column in ("", "before", "after", "unit"):
@@ -250,44 +254,50 @@ def _show(found: "Optimised", console: Console) -> None:
     table.add_row("greatest chip", f"{1000 * before.chip_mm:.1f}", f"{1000 * after.chip_mm:.1f}", "µm")
     table.add_row("lines above a limit", str(before.over), str(after.over), "")
     console.print(table)
-    console.print(f"bound: {found.bound.value:.2f} ({found.bound.how})", markup=False, highlight=False, soft_wrap=True)
+    unit = "s" if found.objective == "time" else found.currency
+    console.print(f"bound: {found.bound.value:.2f} {unit} ({found.bound.how})", markup=False, highlight=False, soft_wrap=True)
     seconds: dict[str, float] = {}
     for line in found.lines:
         binds = line.binds or ("" if line.left_alone else "no limit")
         seconds[binds] = seconds.get(binds, 0.0) + line.after.seconds
     if sum(seconds.values()) > 0.0:
-        console.print(_what_binds(seconds), markup=False, highlight=False, soft_wrap=True)
+        console.print(_what_limits(seconds), markup=False, highlight=False, soft_wrap=True)
     if found.sensitivity is not None:
-        known = found.sensitivity
-        price = f"{known.price_pct:+.1f} % {'time' if found.objective == 'time' else 'cost'}".replace("-", "−")
-        console.print(
-            f"the force limit is kept with a probability of {100 * known.kept:.0f} % (greatest force {known.force_low_n:.1f} to "
-            f"{known.force_high_n:.1f} N, 90 %; {known.source}); keeping it with {100 * known.priced:g} % "
-            f"{'costs' if known.asked is not None else 'would cost'} {price}",
-            markup=False,
-            highlight=False,
-            soft_wrap=True,
-        )
+        console.print(_how_surely(found.sensitivity, found.objective), markup=False, highlight=False, soft_wrap=True)
     if len(found.front) > 1:
         console.print(_front_table(found))
     for note in found.notes:
         console.print(f"note: {note}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _what_binds(seconds: dict[str, float]) -> str:
-    """Return what binds by its part of the time, from the time in s by what binds; "" = the time in lines left alone.
+def _how_surely(known: "Sensitivity", objective: str) -> str:
+    """Return how surely the force limit is kept, where that is from, and the price of more."""
+    said = (
+        f"the force limit is kept with a probability of {100 * known.kept:.0f} % (greatest force {known.force_low_n:.1f} to "
+        f"{known.force_high_n:.1f} N, 90 %; {known.source})"
+    )
+    surely = f"with {100 * known.priced:g} %"
+    if not math.isfinite(known.price_pct):
+        return f"{said}; no program is known that keeps it {surely}"
+    how_much = "no" if known.price_pct < 0.05 else f"{known.price_pct:+.1f} %"
+    costs = "costs" if known.asked is not None else "would cost"
+    return f"{said}; keeping it {surely} {costs} {how_much} {'time' if objective == 'time' else 'cost'}"
 
-    >>> _what_binds({"": 6.7, "cutting force": 2.3, "feed range": 1.0})
-    '67 % of the time is in lines left alone; what binds in the others: cutting force 23 %, feed range 10 %'
+
+def _what_limits(seconds: dict[str, float]) -> str:
+    """Return what limits it by its part of the time, from the time in s by what binds; "" = the time in lines left alone.
+
+    >>> _what_limits({"": 6.7, "cutting force": 2.3, "feed range": 1.0})
+    '67 % of the time is in lines left alone; what limits the others: cutting force 23 %, feed range 10 %'
     """
     total = sum(seconds.values())
     alone = seconds.get("", 0.0)
     most = sorted(((spent, binds) for binds, spent in seconds.items() if binds), reverse=True)[:BINDS_SHOWN]
     what = ", ".join(f"{binds} {100 * spent / total:.0f} %" for spent, binds in most)
     if not alone:
-        return f"what binds, by time: {what}"
+        return f"what limits it, by time: {what}"
     told = f"{100 * alone / total:.0f} % of the time is in lines left alone"
-    return f"{told}; what binds in the others: {what}" if what else told
+    return f"{told}; what limits the others: {what}" if what else told
 
 
 def _front_table(found: "Optimised") -> Table:

@@ -71,7 +71,7 @@ def _table(program: str, machine: str, summary: "Summary") -> Table:
         table.add_row(f"following error {name.upper()}", unit, f"{1000 * error.rms:.1f}", f"{1000 * error.peak:.1f}")
         table.add_row(f"torque command {name.upper()}", "A", f"{torque.rms:.3f}", f"{torque.peak:.3f}")
     if (force := summary.cutting_force_n) is not None:
-        table.add_row("cutting force, while cutting", "N", f"{force.rms:.1f}", f"{force.peak:.1f}")
+        table.add_row("resultant cutting force, while cutting", "N", f"{force.rms:.1f}", f"{force.peak:.1f}")
     if summary.spindle_load_pct is not None:
         table.add_row("spindle load", "%", "", f"{summary.spindle_load_pct:.1f}")
     if summary.spindle_temp_c is not None:

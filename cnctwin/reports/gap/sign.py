@@ -17,6 +17,11 @@ def ticked() -> Markup:
     return drawn(RING, tag("path", d=TICK, class_="stroke"))
 
 
+def half() -> Markup:
+    """Return a ring whose left half is filled."""
+    return drawn(RING, tag("path", d="M16 2.5a13.5 13.5 0 0 0 0 27z", class_="disc"))
+
+
 def diamond(stroke: str) -> Markup:
     """Return a filled diamond with this path on it."""
     return drawn(tag("path", d="M16 .6 31.4 16 16 31.4.6 16z", class_="disc"), tag("path", d=stroke, class_="stroke on"))

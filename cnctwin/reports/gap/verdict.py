@@ -1,7 +1,7 @@
 """The verdict in one sentence, and the figures that matter. Its sign has a shape of its own, so that it needs no colour."""
 
 from cnctwin.reports.gap.markup import Markup, joined, tag, tile
-from cnctwin.reports.gap.sign import DISC, RING, TICK, diamond, drawn, ticked
+from cnctwin.reports.gap.sign import DISC, TICK, diamond, drawn, half, ticked
 from cnctwin.reports.gap.written import known, share, times
 from twin.gap.diagnosis import Diagnosis, GapNumbers, Verdict
 
@@ -19,7 +19,7 @@ def sign(verdict: Verdict) -> Markup:
     return {
         Verdict.HEALTHY: ticked(),
         Verdict.EXPLAINED: drawn(DISC, tag("path", d=TICK, class_="stroke on")),
-        Verdict.PARTLY: drawn(RING, tag("path", d="M16 2.5a13.5 13.5 0 0 0 0 27z", class_="disc")),
+        Verdict.PARTLY: half(),
         Verdict.UNKNOWN: diamond(_QUESTION),
     }[verdict]
 

@@ -25,6 +25,7 @@ MEANING: dict[str, str] = {
     Binds.SPEED_CHANGE: "another speed would be better, but the change of it takes longer than it saves",
     Binds.SHARED_SPEED: "another speed would be better for the line, but not for all that have to have the same",
     Binds.DYNAMICS: "the line is too short for the axes to reach its feed",
+    Binds.RUN_UP: "the line waits for the spindle to reach its speed, and a lower one is reached sooner",
     NOTHING: "at none of them; the speed of its neighbours or the search decides",
     LEFT_ALONE: "feed as programmed, and the speed where the line needs it; the reasons are below",
 }
@@ -68,7 +69,7 @@ def binding(answer: Optimised) -> Markup | None:
         "tr",
         *(
             tag("th", text, scope="col", colspan=wide)
-            for text, wide in (("What binds", None), ("Share of that time, after", "2"), ("Time, s", None), ("Lines", None))
+            for text, wide in (("What limits it", None), ("Share of that time, after", "2"), ("Time, s", None), ("Lines", None))
         ),
     )
     table = tag("table", tag("thead", head), tag("tbody", *drawn), class_="data binding")
@@ -79,7 +80,11 @@ def binding(answer: Optimised) -> Markup | None:
         else None
     )
     return section(
-        "binding", "Where the limits bind", lead, scrollable("What binds", table), tag("p", note, class_="note") if note else None
+        "binding",
+        "Where the limits bind",
+        lead,
+        scrollable("What limits the time", table),
+        tag("p", note, class_="note") if note else None,
     )
 
 

@@ -1,6 +1,7 @@
 """The difference of the two programs, as `diff -u` has it: what goes begins with −, what comes with +, whatever the colour."""
 
 from cnctwin.reports.gap.markup import Markup, joined, section, tag
+from cnctwin.reports.optimisation.headline import counted
 from cnctwin.reports.optimisation.quantity import shortened
 from twin.optimisation.answer import Optimised
 
@@ -18,7 +19,11 @@ def difference(answer: Optimised) -> Markup:
         return section("diff", title, "Nothing: the program stays as it is, letter for letter.")
     comes = sum(kind_of(line) == "comes" for line in given)
     goes = sum(kind_of(line) == "goes" for line in given)
-    lead = f"{comes:,} lines come, {goes:,} go; what is not shown here stays as it was, letter for letter."
+    changed, more = min(comes, goes), comes - goes
+    parted = [f"{counted(changed, 'line')} changed"] if changed or not more else []
+    if more:
+        parted.append(f"{counted(abs(more), 'line')} {'added' if more > 0 else 'removed'}")
+    lead = f"{', '.join(parted)}; what is not shown here stays as it was, letter for letter."
     shown = _within(given)
     parts = [tag("pre", joined(shown, "\n"), class_="diff", tabindex="0", role="region", aria_label="Difference of the programs")]
     if len(given) > len(shown):

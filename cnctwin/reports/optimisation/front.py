@@ -12,7 +12,7 @@ from cnctwin.reports.gap.chart import Frame, plot, x_axis, y_axis
 from cnctwin.reports.gap.markup import Markup, each, joined, scrollable, section, tag
 from cnctwin.reports.gap.written import figure, known
 from cnctwin.reports.optimisation.headline import counted
-from cnctwin.reports.optimisation.quantity import change, column, quantity
+from cnctwin.reports.optimisation.quantity import change, column, quantity, written_s
 from cnctwin.reports.optimisation.totals import bounds
 from twin.optimisation.answer import FrontPoint, Optimised
 
@@ -147,7 +147,7 @@ def _table(answer: Optimised, points: Sequence[FrontPoint]) -> Markup:
     rows = [
         tag(
             "tr",
-            tag("th", column(p.seconds), tag("span", "chosen", class_="role") if p.chosen else None, scope="row"),
+            tag("th", written_s(p.seconds), tag("span", "chosen", class_="role") if p.chosen else None, scope="row"),
             tag("td", change(answer.before.seconds, p.seconds), class_="number"),
             tag("td", column(p.cost), class_="number"),
             tag("td", change(answer.before.cost, p.cost), class_="number"),

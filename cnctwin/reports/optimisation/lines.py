@@ -89,7 +89,10 @@ def _table(answer: Optimised, given: Sequence[LineAnswer], kept: Limits, label: 
         head.append(f"Cost, {answer.currency}")
     rows = [_row(line, above(line, kept), with_cost=len(head) == 7) for line in given]
     table = tag(
-        "table", tag("thead", tag("tr", each("th", [*head, "What binds"], scope="col"))), tag("tbody", *rows), class_="data lines"
+        "table",
+        tag("thead", tag("tr", each("th", [*head, "What limits it"], scope="col"))),
+        tag("tbody", *rows),
+        class_="data lines",
     )
     return scrollable(label, table)
 

@@ -39,6 +39,15 @@ def column(value: float | None, digits: int = 4) -> str:
     return f"{value:.{places}f}".replace("-", "−")
 
 
+def written_s(seconds: float | None) -> str:
+    """The seconds of a program, in the one form that all tables have.
+
+    >>> written_s(5.469), written_s(1845.3), written_s(None)
+    ('5.47', '1845.30', '–')
+    """
+    return f"{seconds:.2f}" if known(seconds) and seconds is not None else figure(seconds)
+
+
 def length_of_time(seconds: float | None) -> str:
     """Seconds as a person says them, from two minutes on; empty below.
 

@@ -2,7 +2,7 @@
 
 from cnctwin.reports.gap.markup import Markup, each, scrollable, section, tag
 from cnctwin.reports.gap.written import stated
-from cnctwin.reports.optimisation.quantity import change, column, limit_figure, shortened
+from cnctwin.reports.optimisation.quantity import change, column, limit_figure, shortened, written_s
 from cnctwin.reports.optimisation.totals import place
 from twin.optimisation.answer import Optimised
 
@@ -40,8 +40,8 @@ def _beside(value: float, limit: float) -> bool:
 def _row(name: str, unit: str, pair: tuple[float, float], digits: int) -> Markup:
     before, after = pair
     cells = (
-        tag("td", column(before, digits), class_="number"),
-        tag("td", tag("b", column(after, digits)), class_="number"),
+        tag("td", written_s(before) if unit == "s" else column(before, digits), class_="number"),
+        tag("td", tag("b", written_s(after) if unit == "s" else column(after, digits)), class_="number"),
         tag("td", unit, class_="unit"),
         tag("td", change(before, after), class_="number"),
     )

@@ -57,7 +57,7 @@ def _chart(answer: Optimised) -> list[Markup]:
         drawn.append(tag("path", d=f"M0 {float(frame.y(np.array([bound]))[0]):.1f}H1000", class_="limit"))
         label += f"; dots: the bound, {figure(bound, 5)}"
     digits = 3 + max(0, _same_digits(frame))
-    axis = tag("div", x_axis(frame, ""), class_="panel time")
+    axis = tag("div", x_axis(frame, "evolution"), class_="panel time")
     body = tag("div", panel(frame, label, joined(drawn), digits), axis, class_="charts", role="img", aria_label=label)
     return [tag("figure", body, class_="trace")]
 

@@ -31,7 +31,7 @@ def _facts(answer: Optimised, given: Sensitivity) -> Markup:
         math.sqrt(max(given.kept * (1.0 - given.kept), 0.0) / given.draws) if given.draws > 0 and known(given.kept) else math.nan
     )
     kept = f"{probability(given.kept)} ± {percent(off, 2)}" if known(off) and off > 0.0 else probability(given.kept)
-    planned = "the mean twin: the limit is not kept with any stated probability"
+    planned = "the constants as stated: the limit is kept with no probability that was asked for"
     if given.asked is not None:
         planned = f"{probability(given.asked)}{_verdict(given, off)}"
     facts = (
@@ -61,7 +61,7 @@ def _price(answer: Optimised, given: Sensitivity) -> str:
     sign = "+" if given.price_pct > 0.0 else ""
     return (
         f"{sign}{figure(given.price_pct, 3)} %: so much worse the {what} {would} if the limit is kept with "
-        f"{probability(given.priced)} instead of by the mean twin"
+        f"{probability(given.priced)} instead of with the constants as stated"
     )
 
 
@@ -81,7 +81,7 @@ def _interval(answer: Optimised, given: Sensitivity) -> Markup | None:
     if known(mean):
         place = f"{100.0 * mean / top:.2f}%"
         drawn.append(tag("svg", tag("path", d="M0-6 6 0 0 6-6 0z", class_="after"), x=place, y=20, class_="place"))
-        said += f"; ◆ by the mean twin, {quantity(mean, 'N', 3)}"
+        said += f"; ◆ with the constants as stated, {quantity(mean, 'N', 3)}"
     if limit is not None:
         place = f"{100.0 * limit / top:.2f}%"
         drawn.append(tag("line", x1=place, x2=place, y1=4, y2=36, class_="limit"))
@@ -112,8 +112,8 @@ def _parts(given: Sensitivity) -> list[Markup]:
     )
     table = tag("table", tag("thead", head), tag("tbody", *rows), class_="data parts")
     more = len(shown) - PARTS_MAX
-    note = tag("p", f"{more} more that say less; all are in the answer's JSON.", class_="note cut") if more > 0 else None
-    return [tag("h3", "Which constant says how much"), joined([scrollable("Parts of the uncertainty", table), note])]
+    note = tag("p", f"{more} smaller ones; all are in the answer's JSON.", class_="note cut") if more > 0 else None
+    return [tag("h3", "How much each constant contributes"), joined([scrollable("Parts of the uncertainty", table), note])]
 
 
 def _part(part: Parted, largest: float) -> Markup:

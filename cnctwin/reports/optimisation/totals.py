@@ -14,6 +14,7 @@ from cnctwin.reports.optimisation.quantity import (
     percent,
     quantity,
     shortened,
+    written_s,
 )
 from twin.optimisation.answer import Objective, Optimised
 
@@ -82,7 +83,8 @@ def bounds(answer: Optimised) -> str:
 
 def _bound(answer: Optimised, of: str) -> tuple[str, str]:
     unit = "s" if of == "seconds" else answer.currency
-    return f"≥ {quantity(answer.bound.value, unit)}", _above(answer)
+    value = f"{written_s(answer.bound.value)} s" if unit == "s" else quantity(answer.bound.value, unit)
+    return f"≥ {value}", _above(answer)
 
 
 def _above(answer: Optimised) -> str:
@@ -95,13 +97,14 @@ def _above(answer: Optimised) -> str:
 def _reach(answer: Optimised) -> str:
     if answer.bound.exact:
         return "It is exact: a program within the limits reaches it, so the distance is what is left to gain."
-    return "It is only a bound: no program is better, and it may be that none reaches it; the true optimum lies at or above it."
+    return "No program can beat it, and perhaps none reaches it; the true optimum lies at or above it."
 
 
 def _row(row: Compared, limit: str, distance: str) -> Markup:
+    written = written_s if row.unit == "s" else column
     cells = (
-        tag("td", column(row.before), class_="number"),
-        tag("td", tag("b", column(row.after)), class_="number"),
+        tag("td", written(row.before), class_="number"),
+        tag("td", tag("b", written(row.after)), class_="number"),
         tag("td", row.unit, class_="unit"),
         tag("td", change(row.before, row.after), class_="number"),
         tag("td", limit, class_="number"),

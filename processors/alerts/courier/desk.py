@@ -31,8 +31,9 @@ FOREIGN_S_MAX = 180.0  # longer than any receiver may take
 BACKOFF_S_MIN, BACKOFF_S_MAX = 2.0, 60.0
 OUTBOX, CLAIM, DELIVERY = topics.ALERT_OUTBOX, topics.ALERT_CLAIM, topics.ALERT_DELIVERY
 SENDING, WAITING = "sending", "waiting"
+REASON_MAX = 400
 INTERRUPTED = "interrupted while sending; it may have arrived"
-FORSAKEN = "another courier claimed it, and did not say what became of it; it may have arrived"
+FORSAKEN = "another process began to send it, and did not report what became of it; it may have arrived"
 
 
 class Publish(NamedTuple):
@@ -203,7 +204,7 @@ class Desk:
             wait_s = outcome.after_s or min(BACKOFF_S_MIN * 2.0 ** min(job.attempts - 1, 10), BACKOFF_S_MAX)
             if now_s + wait_s - began_s <= self._give_up_after_s.get(job.message.receiver, 0.0):
                 job.stage, job.not_before_s = Stage.WAITING, now_s + wait_s
-                self._actions.append(Publish(CLAIM + key, self._claim(job, WAITING)))
+                self._actions.append(Publish(CLAIM + key, self._claim(job, WAITING, reason=outcome.reason)))
                 return
             outcome = outcome._replace(reason=f"given up after {job.attempts} attempts: {outcome.reason}")
         self._settle(job, outcome)
@@ -217,7 +218,9 @@ class Desk:
             name = job.message.receiver
             if job.stage is Stage.WAITING:
                 if name not in self._give_up_after_s:
-                    self._settle(job, Outcome(Verdict.REFUSED, f"the courier has no receiver {name}"))
+                    self._settle(
+                        job, Outcome(Verdict.REFUSED, f"the sending process has no receiver {name} in its configuration")
+                    )
                 elif wall_s > job.message.expires_s:
                     self._settle(job, Outcome(Verdict.REFUSED, "it was too old when it could be sent"))
                 elif name not in busy:
@@ -272,8 +275,10 @@ class Desk:
         topic = CLAIM if job.stage is Stage.CLAIMING else DELIVERY
         self._actions.append(Publish(topic + job.message.id, job.said))
 
-    def _claim(self, job: _Job, phase: str, at: str = "") -> bytes:
+    def _claim(self, job: _Job, phase: str, at: str = "", reason: str = "") -> bytes:
         said = {"id": job.message.id, "courier": self._instance, "phase": phase, "attempt": job.attempts, "at": at}
+        if reason:  # why it was surely not taken, for the state of alerts to show
+            said |= {"receiver": job.message.receiver, "reason": reason[:REASON_MAX]}
         return json.dumps(said, separators=(",", ":")).encode()
 
     def _settle(self, job: _Job, outcome: Outcome) -> None:

@@ -8,6 +8,7 @@ judged by its status and left unread.
 
 import asyncio
 import logging
+import socket
 import ssl
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -47,6 +48,15 @@ class Request:
     def host(self) -> str:
         """The host it goes to, for people to read."""
         return urlsplit(self.url).hostname or "?"
+
+    @property
+    def place(self) -> str:
+        """The host with its port, where the address has one, for people to read."""
+        try:
+            port = urlsplit(self.url).port
+        except ValueError:
+            port = None
+        return self.host if port is None else f"{self.host}:{port}"
 
 
 class Answer:
@@ -102,11 +112,29 @@ async def _limited(request: Request, timeout_s: float, bytes_max: int) -> Answer
     except httpx.TimeoutException as error:
         return _without_answer(request, f"{type(error).__name__} after {timeout_s:g} s", begun)
     except (httpx.HTTPError, httpx.InvalidURL, OSError) as error:
-        return _without_answer(request, f"{type(error).__name__}: {error}", begun)
+        return _without_answer(request, _in_words(error), begun)
+
+
+def _in_words(error: BaseException) -> str:
+    """Return why there is no connection, as the system has it; else the error's own name and text.
+
+    >>> _in_words(ConnectionRefusedError(111, "Connection refused")), _in_words(ValueError("odd"))
+    ('connection refused', 'ValueError: odd')
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        inner = cause.exceptions if isinstance(cause, BaseExceptionGroup) else (cause,)
+        for one in inner:
+            if isinstance(one, ConnectionRefusedError):
+                return "connection refused"
+            if isinstance(one, socket.gaierror):
+                return "there is no host of this name, or it cannot be looked up now"
+        cause = inner[0].__cause__ or inner[0].__context__
+    return f"{type(error).__name__}: {error}"
 
 
 def _without_answer(request: Request, error: str, begun: list[str]) -> Outcome:
-    reason = redacted(f"{request.host}: {error}", [request.url, *request.secrets])
+    reason = redacted(f"{request.place}: {error}", [request.url, *request.secrets])
     if begun:
         return Outcome(Verdict.UNSURE, f"{reason}; it may have arrived")
     return Outcome(Verdict.NOT_TAKEN, reason)

@@ -246,5 +246,5 @@ class Courier:
             try:
                 result = work.do()
             except Exception as error:  # whatever a service does, it has an outcome; its text may hold a secret
-                result = Outcome(Verdict.UNSURE, f"{type(error).__name__} in the courier; it may have arrived")
+                result = Outcome(Verdict.UNSURE, f"{type(error).__name__} while sending; it may have arrived")
             self._results.put((name, work.then, result))

@@ -1,6 +1,8 @@
 """`cnctwin alerts` against a real broker, the real processor and a courier with a receiver on loopback."""
 
 import json
+import re
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -10,6 +12,7 @@ import pytest
 
 from cnctwin.commands.see.alerts import alerts_app, duration_s
 from cnctwin.errors import UsageError
+from cnctwin.plant.doctor import examine
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.thread import Courier
 from processors.config import read_tables
@@ -18,6 +21,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.cnctwin.program import Program, until
 from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
 from tests.until_stopped import until_stopped
@@ -116,7 +120,8 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
     silence = out.split()[1]
     assert f"silence {silence}: machine okuma, until " in cnctwin("list")[1]
     assert " UTC, by ada: [new] tool" in cnctwin("list")[1]
-    assert cnctwin("unsilence", silence, "--by", "ada") == (0, f"silence {silence} has ended\n", "")
+    assert f"there are: {silence}: machine okuma, until " in cnctwin("unsilence", "x", "--by", "ada")[2]
+    assert cnctwin("unsilence", silence[:4], "--by", "ada") == (0, f"silence {silence} has ended\n", "")
     assert cnctwin("test", "desk") == (0, "desk: delivered\n", "")
     assert server.received[-1].json["groupKey"] == "test"
     assert [one["annotations"]["test"] for one in server.received[-1].json["alerts"]] == ["true"]
@@ -134,10 +139,11 @@ def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, ser
 
 def test_wrong_input_is_one_line_and_exit_code_2(cnctwin: Cnctwin, edge: EdgeNode) -> None:
     for arguments, said in (
-        (("ack", "0123", "--by", "ada"), "no alerts fire whose fingerprint begins with '0123'; there are: none"),
+        (("ack", "0123", "--by", "ada"), "no alerts fire whose number begins with '0123'; there are: none"),
         (("silence", "--for", "2h", "--by", "ada"), "a silence needs --machine, --alert or --severity"),
         (("silence", "--machine", "m", "--for", "soon", "--by", "ada"), "'soon' is no duration"),
-        (("unsilence", "nothing", "--by", "ada"), "there is no silence nothing"),
+        (("silence", "--machine", "m", "--for", "2", "--by", "ada"), "--for '2' has no unit; write 2h for hours, 2m for minutes"),
+        (("unsilence", "7", "--by", "ada"), "no silences have a number that begins with '7'; there are: none"),
         (("test", "nobody"), "there is no receiver 'nobody'; there are: desk"),
     ):
         code, out, err = cnctwin(*arguments)
@@ -150,6 +156,37 @@ def test_without_the_processor_it_says_so(cnctwin: Cnctwin, broker: BrokerAddres
     code, _, err = cnctwin("list", "--wait", "1")
     assert code == 2
     assert "does the processor run? (cnctwin process alerts)" in err
+
+
+def test_a_receiver_that_is_down_is_named_and_tried_again(cnctwin: Cnctwin, edge: EdgeNode, server: ReceivingServer) -> None:
+    server.__exit__()
+    code, out, err = cnctwin("test", "desk")
+    said = f"not taken yet (127.0.0.1:{server.port}: connection refused); it will be tried again"
+    assert (code, out, err) == (1, "", f"desk: {said}\n")
+    (desk,) = json.loads(cnctwin("list", "--json")[1])["receivers"].values()
+    assert (desk["waiting"], desk["failed"], desk["last_error"]) == (1, 0, said)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_processor_that_is_gone_is_no_quiet_plant(
+    cnctwin: Cnctwin, broker: BrokerAddress, tmp_path: Path, number: signal.Signals
+) -> None:
+    options = ("--broker", broker.url, "--state-dir", str(tmp_path / "state"))
+    with Program(tmp_path, "process", "rules", "alerts", *options) as program:
+        until(lambda: cnctwin("list", "--wait", "1")[0] == 0, "the processor")
+        program.process.send_signal(number)
+        program.process.wait()
+    code, out, err = cnctwin("list", "--wait", "1")
+    assert (code, out) == (2, "")
+    assert re.fullmatch(
+        r"cnctwin: nothing heard from the processor alerts since 20[\d :-]+ UTC; is `cnctwin process alerts` running\?\n", err
+    )
+    bad = [finding.text for finding in examine(broker, "cnc", 1.5).findings if not finding.good]
+    assert [text.partition(" since 20")[0] for text in bad] == [
+        "no edge node was heard of; start one with `cnctwin edge run CONFIG`",
+        "nothing heard from the processor alerts",
+    ]
+    assert bad[1].endswith("clear what it left on the broker: spBv1.0/STATE/twin-alerts, cnctwin/alerts/state")
 
 
 def test_without_a_broker_it_says_so(mosquitto: Mosquitto, cnctwin: Cnctwin) -> None:

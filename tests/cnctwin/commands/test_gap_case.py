@@ -127,13 +127,15 @@ def test_on_a_terminal_it_asks(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ((), "--machine-file machine.toml is missing"),
+        ((), "--machine machine.toml is missing"),
+        (("--machine", "vmc-41"), "vmc-41: cannot be read"),
+        (("--machine", "vmc-40", "--machine-file", TOLD), "two descriptions of one machine; give one"),
         (("--machine-file", TOLD, "--fit", "d"), "--fit d: no run log has this name; there are a, b, c"),
         (("--machine-file", TOLD, "--fit", "a", "--check", "a"), "nothing is fitted that is judged on"),
         (("--machine-file", TOLD, "--kind", "a"), "--kind a: write NAME=air, cut, warmup or program"),
         (("--machine-file", TOLD, "--kind", "a=drill"), "there is no such kind"),
         (("--machine-file", TOLD, "--program", "a=gone.nc"), "gone.nc: cannot be read"),
-        (("--machine-file", TOLD, "--machine", "vmc"), "--machine belongs to a case from a store"),
+        (("--machine-file", TOLD, "--store", "s"), "--store belongs to a case from a store"),
         (("--machine-file", TOLD, "gone.parquet"), "gone.parquet: there is no such file"),
     ],
 )

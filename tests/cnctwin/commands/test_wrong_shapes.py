@@ -2,7 +2,9 @@
 
 import copy
 import json
+import threading
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from typing import Any
 
@@ -12,8 +14,12 @@ from typer.testing import CliRunner
 from cnctwin.commands.run.jobs import jobs_app
 from cnctwin.commands.see.alerts import alerts_app
 from cnctwin.errors import ApplicationError
+from cnctwin.plant.alert_desk import ALERTS_NODE
 from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
+from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.cnctwin.program import until
 from tests.wire.mosquitto import Mosquitto
 from twin.vocabulary.topics import ALERT_STATE, JOBS_STATE, state_of_job
@@ -35,6 +41,27 @@ JOB = {
     **{"doing": "", "reason": "", "sentence": "", "accepted_ms": 1_795_327_200_999, "changed_ms": 1_795_327_200_999},
 }
 JOBS = {"jobs": [JOB], "disk_trouble": ""}
+
+
+@contextmanager
+def signs_of_life(broker: BrokerAddress) -> Iterator[None]:
+    """The node of the alerts processor, which publishes as if it lived."""
+    node = EdgeNode(broker, NodeId("cnc", ALERTS_NODE), [MetricSpec("health/beat", DataType.INT64, value=0)])
+    stop = threading.Event()
+
+    def beat() -> None:
+        while not stop.wait(0.02):
+            node.publish(None, [Change("health/beat", 1, 1)])
+
+    node.start()
+    heart = threading.Thread(target=beat)
+    heart.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        heart.join()
+        node.stop()
 
 
 def mutants(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -74,9 +101,12 @@ def test_a_state_of_another_shape_is_one_line(
     writer = HostApplication(broker, "writer", (), publish_state=False)
     heard: list[bytes] = []
     writer.subscribe_plain(topic)
-    writer.start()
     refused = 0
-    try:
+    with ExitStack() as stack:
+        if app is alerts_app:
+            stack.enter_context(signs_of_life(broker))
+        writer.start()
+        stack.callback(writer.stop)
         until(lambda: writer.poll(0.01) is not None and writer.online, "the writer")
         for state in (document, *mutants(document)):
             payload = json.dumps({"at": datetime.now(UTC).isoformat(), **state}).encode()
@@ -90,6 +120,4 @@ def test_a_state_of_another_shape_is_one_line(
                     assert "\x1b" not in str(done.exception)
                 else:
                     assert done.exception is None or isinstance(done.exception, SystemExit), (command, state, done.exception)
-    finally:
-        writer.stop()
     assert refused > 0

@@ -46,7 +46,8 @@ def heard(**of: bytes) -> LiveDescriptions:
 
 
 def said(descriptions: LiveDescriptions, *machines: str) -> list[tuple[bool, str]]:
-    return [one for machine in described_machines(descriptions, machines) for one in sentences(machine)]
+    found = [one for machine in described_machines(descriptions, machines) for one in sentences(machine)]
+    return [(one.good, one.text) for one in found]
 
 
 def test_a_machine_whose_constants_are_known_has_one_line() -> None:
@@ -70,7 +71,7 @@ def test_a_section_that_live_figures_rest_on_is_assumed_where_the_file_lacks_it(
     text = '[machine]\nname = "vmc"\n' + TOML[TOML.index("[thermal]") :]
     (machine,) = described_machines(heard(live=message(text)), [])
     assert machine.assumed == ("spindle",)
-    assert "vmc: spindle is assumed; " in [*sentences(machine)][1][1]
+    assert "vmc: spindle is assumed; " in [*sentences(machine)][1].text
 
 
 def test_a_connected_machine_that_nobody_has_described_is_named_with_the_way_out() -> None:
@@ -160,4 +161,4 @@ def test_the_command_reads_descriptions_from_the_broker(
         "challenger_why": "",
         "faults": ["machines/vmc.toml: wrong"],
     }
-    assert {"good": False, "text": "vmc: machines/vmc.toml: wrong"} in report["findings"]
+    assert {"good": False, "text": "vmc: machines/vmc.toml: wrong", "note": False} in report["findings"]

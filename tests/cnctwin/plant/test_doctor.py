@@ -11,7 +11,6 @@ import pytest
 
 from cnctwin.cli import main
 from cnctwin.plant.doctor import (
-    Finding,
     Report,
     counted_signals,
     examine,
@@ -25,6 +24,7 @@ from cnctwin.plant.doctor import (
     of_sloppy_peers,
     of_store,
 )
+from cnctwin.plant.finding import Finding
 from cnctwin.plant.lags import behind, lag_reports
 from cnctwin.plant.view import own_values
 from edge.running.awaited import LATE_S, NO_HISTORIAN
@@ -90,8 +90,9 @@ def test_a_healthy_plant_has_no_bad_finding_and_counted_holes_are_told(mosquitto
     assert seen.good
     told = " | ".join(finding.text for finding in seen.findings)
     assert "edge-vmc: 10 = 7 emitted + 2 dropped + 1 buffered" in told
-    assert "vmc: its control is connected; 1 signals, 0 not good" in told
-    assert "3 holes so far, counted" in told
+    assert "vmc: its control is connected; 1 signal, 0 not good" in told
+    assert "3 gaps in the data so far" in told
+    assert [finding.mark for finding in seen.findings if "gaps" in finding.text] == ["note"]
 
 
 def test_signals_that_are_not_good_are_named() -> None:
@@ -142,7 +143,7 @@ def test_a_program_reads_the_whole_report(
         assert call(monkeypatch, "--broker", url, "--seconds", "1.2", "--json") == code
     said = json.loads(capfd.readouterr().out)
     assert said["good"] is (code == 0)
-    assert {"good", "text"} == set(said["findings"][0])
+    assert {"good", "text", "note"} == set(said["findings"][0])
     (ledger,) = said["ledgers"]
     assert ledger["node"] == "edge-vmc"
     assert ledger["balances"] is (code == 0)
@@ -241,6 +242,7 @@ def test_a_peer_that_does_not_keep_a_rule_is_told_and_is_no_bad_news() -> None:
         Finding(
             True,
             "3 aliases stood for a metric of a node and one of its device (as Tahu Java gives them); read all the same",
+            note=True,
         )
     ]
 
@@ -256,7 +258,7 @@ def test_rows_that_the_historian_misses_are_bad_news() -> None:
 def test_contained_faults_are_counted_and_the_last_one_is_told() -> None:
     text = "a beat failed; restarted after 1 s, 2 times so far: OSError: disk full"
     (finding,) = of_faults("twin-alerts", told(faults=3, restarts=2, fault=text))
-    assert finding == Finding(True, f"twin-alerts: 3 faults contained, restarted 2 times; the last: {text}")
+    assert finding == Finding(True, f"twin-alerts: 3 faults contained, restarted 2 times; the last: {text}", note=True)
     assert of_faults("twin-alerts", told(faults=0, restarts=0, fault="")) == of_faults("edge-okuma", {}) == []
 
 

@@ -9,6 +9,8 @@ import pytest
 from rich.console import Console
 
 from cnctwin.plant import watch as watch_module
+from cnctwin.plant.screen import Cropped, screen
+from cnctwin.plant.view import ledgers, machines
 from cnctwin.plant.watch import show
 from sparkplug.host import HostEvent
 from tests.cnctwin.plant.pictures import Pictures, balance, owner
@@ -50,6 +52,15 @@ def test_elsewhere_than_in_a_terminal_there_are_lines() -> None:
 
 def test_a_terminal_that_cannot_move_its_cursor_gets_lines_too() -> None:
     assert seen(terminal=True, kind="dumb") == seen(terminal=False)
+
+
+def test_a_low_terminal_says_how_to_see_the_rest() -> None:
+    console = Console(file=io.StringIO(), width=80, height=12, force_terminal=True, _environ={"TERM": "xterm"})
+    host = plant()
+    console.print(Cropped(screen(machines(host), ledgers(host), "a note"), "a note"))
+    lines = str(console.file.getvalue()).splitlines()  # type: ignore[attr-defined]
+    assert len(lines) == 11
+    assert "more lines: enlarge the window, or name one machine (cnctwin watch MACHINE)" in lines[-1]
 
 
 def test_in_a_terminal_there_is_a_screen() -> None:

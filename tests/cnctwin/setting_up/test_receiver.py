@@ -26,6 +26,7 @@ def receivers(text: str) -> dict[str, object]:
     [
         ("pushover", {"type": "pushover", "token": "$PUSHOVER_TOKEN", "user": "$PUSHOVER_USER"}),
         ("https://hooks.plant.example/T0/abc", {"type": "webhook", "url": "$CNCTWIN_ALERTS_URL"}),
+        ("http://localhost:9000/cnctwin", {"type": "webhook", "url": "$CNCTWIN_ALERTS_URL"}),
         ("mailto://ada:s3cret@plant.example", {"type": "apprise", "url": "$CNCTWIN_ALERTS_URL"}),
     ],
 )
@@ -47,5 +48,7 @@ def test_it_goes_and_leaves_the_file_as_it_was() -> None:
 
 @pytest.mark.parametrize("answer", ["", "ada", "://hooks"])
 def test_an_answer_that_names_nobody_is_refused(answer: str) -> None:
-    with pytest.raises(UsageError, match="alerts go to pushover, to an https:// address, to an address of Apprise, or to none"):
+    with pytest.raises(
+        UsageError, match=r"alerts go to pushover, to an https:// address .or http:// on this computer., to an address of Apprise"
+    ):
         kind_of(answer)

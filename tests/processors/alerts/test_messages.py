@@ -54,7 +54,7 @@ def test_what_no_courier_takes_is_said_to_have_failed() -> None:
     shop.wait(30)
     shop.command("ack", fingerprint=shop.fingerprint())
     shop.wait(7 * 3600, beat_s=30.0)
-    assert [one["reason"] for one in shop.shown()["failures"]] == ["no courier said what became of it; it may have arrived"]
+    assert [one["reason"] for one in shop.shown()["failures"]] == ["what became of it was not reported; it may have arrived"]
     assert outbox(shop) == {}
 
 
@@ -141,7 +141,7 @@ def test_who_acknowledges_is_shown() -> None:
     alert = shop.alert()
     assert (alert["phase"], alert["acknowledged_by"], alert["comment"]) == ("acknowledged", "ada", "on my way")
     again = shop.command("ack", fingerprint=shop.fingerprint())
-    assert again == {"done": True, "text": "rule_vibration on okuma was acknowledged by ada before"}
+    assert again == {"done": True, "text": "rule_vibration on okuma is already acknowledged by ada"}
 
 
 def test_an_acknowledgement_is_for_the_episode_that_fires() -> None:

@@ -73,6 +73,12 @@ def test_what_cannot_be_kept_is_said_in_one_line(limits: dict[str, object], says
     assert "\n" not in str(refused.value)
 
 
+OTHER_TOOL: dict[str, object] = {
+    "tool": None,
+    "tools": {"9": {"diameter_mm": 6.0, "teeth": 2, "tangential_coefficient_n_per_mm2": 800.0, "radial_ratio": 0.3}},
+}
+
+
 @pytest.mark.parametrize(
     ("sections", "says"), [({"limits": None}, "no \\[limits\\]"), ({"stock": None}, "no \\[stock\\]")], ids=["limits", "stock"]
 )
@@ -86,13 +92,20 @@ def test_what_the_machine_does_not_say_is_asked_for(sections: dict[str, None], s
 @pytest.mark.parametrize(
     ("sections", "says"),
     [
-        ({"tool": None}, "none of the 3 feed lines may be changed; 3 of them: its tool is not described; write \\[tools.N\\]"),
-        ({"tool": None, "spindle": SPINDLE}, "its tool is not described"),
+        (OTHER_TOOL, "none of the 3 feed lines may be changed; 3 of them: its tool is not described; write \\[tools.N\\]"),
+        ({**OTHER_TOOL, "spindle": SPINDLE}, "its tool is not described"),
     ],
 )
 def test_a_program_in_which_nothing_may_be_changed_says_why(sections: dict[str, object], says: str) -> None:
     with pytest.raises(OptimisationError, match=says):
         optimise(second(machine_toml=machine_with(text("second.toml"), **sections)))
+
+
+@pytest.mark.parametrize("more", [{}, {"limits": None}, {"stock": None}, {"limits": None, "stock": None}])
+def test_a_machine_without_a_tool_says_so_before_anything_else_that_it_lacks(more: dict[str, None]) -> None:
+    """A lathe has neither: to ask for limits, then for a block, then for a tool would lead nowhere."""
+    with pytest.raises(MachineError, match=r"^no \[tool\]: no force is computed, so that there is nothing to choose"):
+        problem(second(machine_toml=machine_with(text("second.toml"), tool=None, **more)))
 
 
 def test_a_program_without_a_feed_move_says_so() -> None:

@@ -13,9 +13,9 @@ WHOLE = {
 }
 
 
-def said(language: str, text: str) -> tuple[str, ...]:
+def said(language: str, text: str, met: frozenset[int] | None = None) -> tuple[str, ...]:
     dialect = named(language)
-    return remarks(dialect, text, dialect.interpret(text, Settings(dialect=language)))
+    return remarks(dialect, text, dialect.interpret(text, Settings(dialect=language)), met)
 
 
 @pytest.mark.parametrize("language", WHOLE)
@@ -45,8 +45,15 @@ def test_a_block_of_several_lines_is_named_by_its_number() -> None:
 @pytest.mark.parametrize("language", WHOLE)
 def test_cuts_without_a_spindle_are_named_with_the_first_of_them(language: str) -> None:
     (only,) = said(language, WHOLE[language].replace("M3\n", "\n"))
-    assert only.startswith("nothing starts the spindle: the cuts from ")
+    assert only.startswith("nothing starts the spindle: the feed moves from ")
     assert ("block 3 (line 4)" if language == "klartext" else "line") in only
+
+
+def test_where_the_stock_is_known_only_what_meets_it_is_a_cut() -> None:
+    text = "G21 G90\nG1 X5. F200\nG1 Z-1.\nM30"
+    assert said("fanuc", text, frozenset()) == ()
+    (only,) = said("fanuc", text, frozenset({2}))
+    assert only.startswith("nothing starts the spindle: the cuts from line 3 on have a spindle at rest")
 
 
 @pytest.mark.parametrize("language", WHOLE)

@@ -179,6 +179,10 @@ def test_a_cut_that_is_none_is_said_with_its_line(program: str, said: str) -> No
     assert not np.nan_to_num(done.run["axial_depth_mm"]).any()
 
 
+def test_a_feed_beside_the_stock_needs_no_spindle() -> None:
+    assert not any("spindle" in note for note in simulate(MACHINE, "G0 X-5 Y15 Z50\nG1 X35 F500\nM30\n").notes)
+
+
 def test_an_axis_at_its_torque_limit_is_said() -> None:
     weak = MACHINE.axes["x"].model_copy(update={"torque_limit_a": 0.7})
     done = simulate(MACHINE.model_copy(update={"axes": MACHINE.axes | {"x": weak}}), SLOT)

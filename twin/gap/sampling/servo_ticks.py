@@ -17,6 +17,7 @@ from twin.errors import RunLogError
 from twin.gap.sampling.sample_times import SampleTimes, sample_times
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import STILL_MIN
 
 Floats = NDArray[np.float64]
 SLOW_S, SLOW_TICKS = 0.02, 1.5
@@ -63,18 +64,38 @@ def on_servo_ticks(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
 def _with_doubt(name: str, log: RunLog, placed: RunLog, times: SampleTimes, machine: MachineFile, notes: list[str]) -> RunLog:
     """The placed recording with a column that is 1 where the reference of an axis is not known well enough between samples."""
     columns = dict(placed.columns)
+    moving = []
     for letter, axis in machine.axes.items():
         reference = log.columns.get(f"{letter}_ref_mm")
         if reference is None:
             continue
+        unsettled = _unsettled(placed.columns[f"{letter}_ref_mm"], machine.machine.servo_period_s)
         doubt = times.in_doubt(reference, axis.position_gain_per_s, machine.machine.servo_period_s)
+        if unsettled:
+            moving.append(letter)
+        if unsettled or doubt.any():
+            columns[f"{letter}_{DOUBT}"] = (doubt | (np.arange(times.count) < unsettled)).astype(np.float64)
         if doubt.any():
-            columns[f"{letter}_{DOUBT}"] = doubt.astype(np.float64)
             notes.append(
                 f"{name}: between samples the reference of {letter} is not known well enough for {np.mean(doubt):.0%} of the "
                 "time; its loops are not compared there"
             )
+    if moving:
+        notes.append(
+            f"{name}: begins while {' and '.join(moving)} {'move' if len(moving) > 1 else 'moves'}, in a state that is not "
+            f"recorded; the first {SETTLED_S:g} s are not compared"
+        )
     return replace(placed, columns=columns)
+
+
+def _unsettled(reference: Floats, period_s: float) -> int:
+    """Return the ticks over which an axis still has the state that it had before a recording; 0 where it begins at rest.
+
+    That state (velocity, integral, friction) is only guessed from the first samples. At most a quarter of a short run.
+    """
+    if np.all(np.diff(reference[: STILL_MIN + 1]) == 0.0):
+        return 0
+    return min(round(SETTLED_S / period_s), len(reference) // 4)
 
 
 def _placed(log: RunLog, times: SampleTimes, period_s: float) -> RunLog:

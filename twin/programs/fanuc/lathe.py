@@ -1,6 +1,7 @@
 """The words that mark a lathe's program (FANUC G-code system A), where G99, G50 and X mean something else than on a mill."""
 
 import re
+from collections.abc import Container
 from typing import Final
 
 from twin.errors import PartProgramError
@@ -29,3 +30,14 @@ def refuse_lathe(text: str) -> None:
     for mark in MARKS.finditer(bare):
         if mark.group(1) is not None or not changes:
             raise PartProgramError(bare.count("\n", 0, mark.start()) + 1, " ".join(mark.group().split()), REASON)
+
+
+def lathe_remarks(axes: Container[str]) -> tuple[str, ...]:
+    """Return what a person should know of a program for a machine with these axes, where they are those of a lathe.
+
+    >>> lathe_remarks("xyz"), len(lathe_remarks("xz"))
+    ((), 1)
+    """
+    if "y" in axes or "x" not in axes or "z" not in axes:
+        return ()
+    return ("the machine has no Y axis: its program is read as a mill's, so X is a radius, and G99 no feed per revolution",)

@@ -127,7 +127,8 @@ def test_the_figures_of_the_paper_are_told_with_their_units_and_where_they_come_
 
 def test_a_bound_that_no_program_need_reach_is_called_so() -> None:
     text = PageReader(report_html(bare())).text
-    assert "It is only a bound" in text and "reaches it, so" not in text
+    assert "No program can beat it, and perhaps none reaches it" in text and "reaches it, so" not in text
+    assert "Above the bound" in text and "which no program can beat" in text and "need reach" not in text
 
 
 def test_without_cost_limits_or_a_second_run_nothing_is_made_up() -> None:
@@ -155,7 +156,44 @@ def test_lines_above_a_limit_are_bad_news_at_once() -> None:
 @pytest.mark.parametrize(("objective", "words"), [(Objective.TIME, "best time, s"), (Objective.COST, "best cost, KRW")])
 def test_the_course_of_the_search_says_what_it_is_of(objective: Objective, words: str) -> None:
     answer: Optimised = replace(paper(), objective=objective)
-    assert f"{words}, after each evolution" in PageReader(report_html(answer)).text
+    page = report_html(answer)
+    assert f"{words}, after each evolution" in PageReader(page).text
+    assert '<span class="unit">evolution</span>' in page
+
+
+@pytest.mark.parametrize(
+    ("known", "says"),
+    [
+        (
+            {"kept": 0.503, "asked": None, "price_pct": 26.0, "identified": False},
+            "The force limit is kept with 50 % probability, and none of its constants was identified; --probability 0.95 costs "
+            "26 % more",
+        ),
+        ({"kept": 0.7, "asked": None, "price_pct": 0.0}, "with 70 % probability; --probability 0.95 costs no more"),
+        ({"kept": 0.7, "asked": None, "price_pct": math.inf}, "70 % probability; no program is known that keeps it with 95 %"),
+        ({"kept": 0.7, "asked": 0.95}, "The force limit is kept with 70 % probability; 95 % was asked for"),
+    ],
+)
+def test_a_limit_of_force_that_is_a_coin_toss_has_no_tick(known: dict[str, Any], says: str) -> None:
+    answer = paper()
+    assert answer.sensitivity is not None
+    page = PageReader(report_html(replace(answer, sensitivity=replace(answer.sensitivity, **known))))
+    assert says in page.text and "mean twin" not in page.text
+    assert page.of("header", class_="unsure") and not page.of("header", class_="healthy")
+
+
+@pytest.mark.parametrize("known", [{"kept": 0.99, "asked": None}, {"kept": 0.945, "asked": 0.95}])
+def test_a_limit_of_force_that_is_kept_surely_has_one(known: dict[str, Any]) -> None:
+    answer = paper()
+    assert answer.sensitivity is not None
+    page = PageReader(report_html(replace(answer, sensitivity=replace(answer.sensitivity, **known))))
+    assert "All limits kept, that of force with 9" in page.text
+    assert page.of("header", class_="healthy")
+
+
+def test_a_time_has_one_form_wherever_it_stands() -> None:
+    text = PageReader(report_html(replace(paper(), after=replace(paper().after, seconds=5.469)))).text
+    assert "5.47" in text and "5.469" not in text
 
 
 def test_the_style_is_in_the_package() -> None:

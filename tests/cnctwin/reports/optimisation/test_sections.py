@@ -87,7 +87,7 @@ def test_every_reason_that_may_bind_is_explained() -> None:
 
 
 def test_people_count_lines_from_one() -> None:
-    assert re.search(r"What binds 4 G1 X5\.8", read(paper()).text)
+    assert re.search(r"What limits it 4 G1 X5\.8", read(paper()).text)
 
 
 def test_a_short_program_is_shown_whole_with_source_and_what_binds() -> None:
@@ -179,7 +179,7 @@ def test_of_which_total_a_bound_is_is_told_by_the_figures_of_a_front() -> None:
         (0.95, 0.953, "95 %, and kept"),
         (0.95, 0.945, "95 %, and kept as far as so many draws tell"),
         (0.95, 0.60, "95 %, and not kept ▲"),
-        (None, 0.51, "the mean twin: the limit is not kept with any stated probability"),
+        (None, 0.51, "the constants as stated: the limit is kept with no probability that was asked for"),
     ],
 )
 def test_whether_the_limit_is_kept_as_asked_is_said_in_words(asked: float | None, kept: float, words: str) -> None:
@@ -214,7 +214,7 @@ def test_the_difference_is_told_by_its_signs_and_nothing_of_it_is_lost() -> None
     answer = paper()
     page = read(answer)
     assert len(page.of("span", class_="comes")) == len(page.of("span", class_="goes")) == 10
-    assert "10 lines come, 10 go; what is not shown here stays as it was" in page.text
+    assert "10 lines changed; what is not shown here stays as it was" in page.text
     inside = re.search(r"<pre class=\"diff\".*?>(.*?)</pre>", report_html(answer), re.S)
     assert inside and re.sub(r"<.*?>", "", inside[1]) == answer.diff
 

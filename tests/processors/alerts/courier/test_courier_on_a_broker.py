@@ -124,7 +124,7 @@ def test_what_nobody_is_configured_for_and_what_is_too_old_fails(office: Office,
     office.put("u", "nobody")
     office.put("o", expires_s=time.time() - 1.0)
     until(lambda: office.outcome("u") == office.outcome("o") == "failed", "the failures")
-    assert office.deliveries["u"][-1]["reason"] == "the courier has no receiver nobody"
+    assert office.deliveries["u"][-1]["reason"] == "the sending process has no receiver nobody in its configuration"
 
 
 def test_two_couriers_that_overlap_send_each_notification_once_and_leave_no_thread(

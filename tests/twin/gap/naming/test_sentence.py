@@ -63,8 +63,9 @@ def told(verdict: Verdict, **fields: Any) -> Diagnosis:
             Verdict.PARTLY,
             {"causes": (FRICTION,), "subsystems": PARTS, "learned": (PUSH,), "where_after": (LEFT,)},
             "Partly explained: 77 % of the gap comes from direction friction on X (-0.16 ± 0.02; or gravity); 23 % remains, most "
-            "of it in the X torque while it accelerates; X controller healthy; X mechanics 8 × the "
-            "repeatability, in direction friction; described: a force on X of +43 N between 118 and 141 mm.",
+            "of it in the X torque while it accelerates; X controller healthy; X mechanics 8 × the repeatability, in direction "
+            "friction; "
+            "described: a force on X of +43 N between 118 and 141 mm.",
         ),
     ],
 )

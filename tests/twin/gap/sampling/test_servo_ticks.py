@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.twin.gap.sampling.recorded_at import case_recorded_every
-from tests.twin.gap.small_case import MACHINE, case_of, plant
+from tests.twin.gap.small_case import MACHINE, case_of, columns_of, plant
 from twin.case import Case, RunKind
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Verdict
@@ -43,6 +43,18 @@ def test_an_effect_has_the_same_name_at_any_sample_period(sample_s: float, jitte
 @pytest.mark.parametrize(("sample_s", "jitter_s"), [(0.0005, 0.0), (0.0012, 0.0), (0.0033, 0.001), (0.008, 0.0)])
 def test_a_healthy_axis_is_healthy_at_any_sample_period(sample_s: float, jitter_s: float) -> None:
     assert diagnose(case_recorded_every(sample_s, jitter_s=jitter_s)).diagnosis.verdict is Verdict.HEALTHY
+
+
+@pytest.mark.parametrize("first", [0, 400])
+def test_a_recording_that_begins_in_motion_is_no_gap(first: int) -> None:
+    case = case_recorded_every(0.001)
+    cut = {}
+    for name, columns in columns_of(case).items():
+        begin = int(np.flatnonzero(np.diff(columns["z_ref_mm"]))[first])
+        cut[name] = {column: values[begin:] for column, values in columns.items()}
+    answer = diagnose(case_of(MACHINE, cut)).diagnosis
+    assert answer.verdict is Verdict.HEALTHY, answer.sentence
+    assert sum("begins while z moves" in note for note in answer.notes) == 1
 
 
 def test_the_spindle_turns_on_between_slower_samples() -> None:

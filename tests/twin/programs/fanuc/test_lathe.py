@@ -2,8 +2,11 @@
 
 import pytest
 
+from cnctwin.machines.starters import starter_text
 from twin.errors import PartProgramError
+from twin.machine import machine_from_toml
 from twin.programs.interpretation import interpret
+from twin.simulator.simulation import simulate
 
 
 @pytest.mark.parametrize(
@@ -34,3 +37,8 @@ def test_it_is_refused_at_its_first_word(text: str, line: int, word: str) -> Non
 )
 def test_a_mills_program_is_run(text: str) -> None:
     interpret(text)
+
+
+def test_a_lathe_says_that_its_program_is_read_as_a_mills() -> None:
+    notes = simulate(machine_from_toml(starter_text("lathe", "l")), "G21\nG1 X2. Z1. F600\nM30").notes
+    assert "its program is read as a mill's, so X is a radius" in " ".join(notes)

@@ -101,7 +101,7 @@ export function open(app) {
     const { machine = "", alertname = "" } = alert.labels ?? {};
     const hours = el("input", { class: "field", name: "hours", type: "number", min: "0.1", max: "720", step: "any", value: "2" });
     const about = [
-      el("p", {}, el("strong", {}, machine), `: no notifications of ${words(alertname)} for a while. It stays on this page.`),
+      el("p", {}, el("strong", {}, machine), `: ${sentence(alert)}. Nobody gets a notification of it until the silence ends; it stays on this page.`),
       el("label", { class: "named" }, "For how many hours", hours),
     ];
     openSigned("Silence", about, "Silence", async (by, comment) => {

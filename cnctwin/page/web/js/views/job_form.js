@@ -38,7 +38,7 @@ export function openNewJob(accepted) {
   const objective = choice("objective", OBJECTIVES);
   const changes = choice("speed_changes", SPEED_CHANGES);
   const force = number("force_limit_n", "0", null, "any", "as in machine.toml"),
-    probability = number("probability", "0", "1", "any", "by the mean twin"),
+    probability = number("probability", "0", "1", "any", "constants as stated"),
     seed = number("seed", "0", String(2 ** 32 - 1), "1", "1"),
     evolutions = number("evolutions", "1", "100000", "1", "60"),
     population = number("population", "4", "100000", "2", "64");
