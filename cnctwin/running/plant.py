@@ -46,9 +46,8 @@ class Plant:
         """Start everything, the broker first; return the address of the page."""
         folder = self.folder
         if not folder.processors.is_file():
-            raise UsageError(
-                f"{folder.root}: has no processors.toml; `cnctwin init {shlex.quote(str(folder.root))}` sets a plant up"
-            )
+            root = shlex.quote(str(folder.root))
+            raise UsageError(f"{folder.root}: has no processors.toml; `cnctwin init {root}` sets a plant up")
         folder.state.mkdir(parents=True, exist_ok=True)
         os.environ.update({STATE_VARIABLE: str(folder.state), STORE_VARIABLE: str(folder.root / "store")} | folder.environment())
         broker = ["--broker", self._broker()]

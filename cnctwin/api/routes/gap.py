@@ -56,9 +56,7 @@ class Gap(Answer):
     basis: str | None
     diagnosis: dict[str, Any] | None
     diagnosis_reason: str | None
-    diagnosis_do: str | None = Field(
-        default=None, description="a command that makes the missing diagnosis where it is looked for"
-    )
+    diagnosis_do: str | None = Field(default=None, description="command that makes the missing diagnosis")
     report: str | None
 
 

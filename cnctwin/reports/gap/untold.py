@@ -95,7 +95,7 @@ def judged(diagnosed: Diagnosed) -> Markup:
         ("Before", refitted),
         (
             "Closed",
-            "1 − (after² − 1) / (before² − 1), in multiples of the repeatability: the share of the gap above it that is gone.",
+            "1 − (after² − 1) / (before² − 1), as multiples of the repeatability: the share gone of what is above.",
         ),
         ("Not fitted", ", ".join(used[False]) or "No run was kept back."),
         ("Fitted", ", ".join(used[True]) or "No run of those shown."),
