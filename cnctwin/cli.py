@@ -17,7 +17,6 @@ from typer.main import get_group
 
 from cnctwin.commands import connect, keep, learn, run, see, twin
 from cnctwin.commands.group import CommandGroup
-from cnctwin.commands.without_argument import explained
 from cnctwin.errors import ApplicationError, BrokerStartError
 from cnctwin.files.modes import restrict
 from edge.errors import EdgeError
@@ -120,8 +119,11 @@ def _explain(error: TyperException) -> NoReturn:
     if not message:  # A command without arguments: its help has been shown already.
         raise SystemExit(2)
     context, option = getattr(error, "ctx", None), getattr(error, "option_name", None)
-    if context is None and option and (told := explained(get_group(app), sys.argv[1:], option)):
-        _fail(told, 2)
+    if context is None and option:
+        from cnctwin.commands.without_argument import explained
+
+        if told := explained(get_group(app), sys.argv[1:], option):
+            _fail(told, 2)
     joint = " See" if message.endswith("?") else "; see"
     _fail(f"{message.rstrip('.')}{joint} {'cnctwin' if context is None else context.command_path} --help", 2)
 
