@@ -19,6 +19,7 @@ from cnctwin.commands import connect, keep, learn, run, see, twin
 from cnctwin.commands.group import CommandGroup
 from cnctwin.errors import ApplicationError, BrokerStartError
 from cnctwin.files.modes import restrict
+from cnctwin.terminal.without_argument import explained
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
@@ -119,11 +120,8 @@ def _explain(error: TyperException) -> NoReturn:
     if not message:  # A command without arguments: its help has been shown already.
         raise SystemExit(2)
     context, option = getattr(error, "ctx", None), getattr(error, "option_name", None)
-    if context is None and option:
-        from cnctwin.commands.without_argument import explained
-
-        if told := explained(get_group(app), sys.argv[1:], option):
-            _fail(told, 2)
+    if context is None and option and (told := explained(get_group(app), sys.argv[1:], option)):
+        _fail(told, 2)
     joint = " See" if message.endswith("?") else "; see"
     _fail(f"{message.rstrip('.')}{joint} {'cnctwin' if context is None else context.command_path} --help", 2)
 
