@@ -17,9 +17,9 @@ from typer.main import get_group
 
 from cnctwin.commands import connect, keep, learn, run, see, twin
 from cnctwin.commands.group import CommandGroup
-from cnctwin.commands.without_argument import explained
 from cnctwin.errors import ApplicationError, BrokerStartError
 from cnctwin.files.modes import restrict
+from cnctwin.terminal.without_argument import explained
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError

@@ -9,7 +9,7 @@ import typer
 import typer.main
 
 from cnctwin.cli import GROUPS, app
-from cnctwin.commands.without_argument import EXAMPLES, explained
+from cnctwin.terminal.without_argument import EXAMPLES, explained
 
 SAME = {
     "--broker",
