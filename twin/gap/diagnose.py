@@ -29,11 +29,12 @@ from twin.gap.parts.subsystems import subsystems_of
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
-from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
+from twin.gap.score import Squares, gap_of, squares_of, traces_of
 from twin.gap.shares import shapley
 from twin.gap.stages.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.stages.shown import shown_by_run
 from twin.gap.stages.without_column import beside_columns
+from twin.gap.units import unit_of
 from twin.gap.verdict import Judged, judged, overall
 from twin.gap.where import where
 from twin.machine import MachineFile

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Interval, closure_of
 from twin.gap.fitting import Fitted
-from twin.gap.score import Squares, unit_on
+from twin.gap.score import Squares
+from twin.gap.units import unit_on
 
 Floats = NDArray[np.float64]
 Intervals = dict[Effected, dict[str, Interval]]

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from twin.case import Case
 from twin.errors import CaseError
 from twin.gap.inspection import inspected
-from twin.gap.score import gap_of, squares_of, unit_of
+from twin.gap.score import gap_of, squares_of
 from twin.gap.stages.plan import ground_of
 from twin.gap.stages.shown import shown_by_run
+from twin.gap.units import unit_of
 from twin.machine import MachineFile
 from twin.rotary import outside_names
 

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict
 from cnctwin.errors import UsageError
 from cnctwin.files.sealed import Sealed, read_sealed, seal, write_sealed
 from twin.effects.catalogue import effect_named
-from twin.gap.score import unit_on
+from twin.gap.units import unit_on
 from twin.machine import AddedEffect
 
 EFFECTS = Path(__file__).with_name("hidden_effects.toml")

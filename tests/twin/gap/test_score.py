@@ -6,8 +6,9 @@ import pytest
 from tests.twin.gap.small_case import MACHINE, air_case, case_of, columns_of
 from twin.errors import CaseError
 from twin.gap.floors import Floors
-from twin.gap.score import Squares, gap_of, squares_of, unit_of
+from twin.gap.score import Squares, gap_of, squares_of
 from twin.gap.score_of import score_of
+from twin.gap.units import unit_of
 from twin.machine import AddedEffect
 
 GRAVITY = AddedEffect(effect="gravity", on="z", parameters={"force_n": 400.0})
