@@ -5,9 +5,9 @@ from typing import Final
 
 from twin.errors import PartProgramError
 
-MARKS: Final = re.compile(r"(?<![A-Z0-9#.])(?:G50[ \t]*+(S)[ \t]*+[0-9.]++|T([0-9]{2})(?:\2|00)(?![0-9.]))", re.I)
+MARKS: Final = re.compile(r"(?<![A-Z#])(?:G50[ \t]*+(S)[ \t]*+[0-9.]++|T([0-9]{2})(?:\2|00)(?![0-9.]))", re.I)
 """`G50 S2500`, the highest speed, and `T0101`, a turret's place with its offset."""
-CHANGE: Final = re.compile(r"(?<![A-Z0-9#.])M0?6(?![0-9.])", re.I)
+CHANGE: Final = re.compile(r"(?<![A-Z#])M0?6(?![0-9.])", re.I)
 COMMENT: Final = re.compile(r"\([^)\n]*+\)?+|;[^\n]*+")
 REASON: Final = (
     "belongs to a lathe (G-code system A), which is not read: X would be a diameter there, and G99 a feed per revolution; "

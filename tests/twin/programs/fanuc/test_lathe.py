@@ -16,6 +16,8 @@ from twin.simulator.simulation import simulate
         ("G21 G99\r\n(T0202)\r\nT0101\r\nG97 S800 M3\r\nG0 X52. Z2.", 3, "T0101"),
         ("G0 X1.\nT0300", 2, "T0300"),
         ("T0101 M6\ng50s1800", 2, "g50s1800"),
+        ("G21\nN10G0T0202", 2, "T0202"),
+        ("N10G50S900", 1, "G50S900"),
     ],
 )
 def test_it_is_refused_at_its_first_word(text: str, line: int, word: str) -> None:
@@ -28,6 +30,7 @@ def test_it_is_refused_at_its_first_word(text: str, line: int, word: str) -> Non
     "text",
     [
         "T0101 M06\nG0 X1.",
+        "N10T0202M6\nG0 X1.",
         "M6 T1010\nS800 M3",
         "(G50 S2500, T0101 of the other machine)\nG0 X1.",
         "G51 X0. Y0. P2.\nG1 X1. F100.\nG50\nS500",
